@@ -1,0 +1,15 @@
+# The libraries, for the build and for users of the installed package alike. packages.txt names the
+# Debian packages that bring them.
+find_package(Threads REQUIRED)
+find_package(PNG REQUIRED)
+find_package(TIFF REQUIRED)
+find_package(OpenEXR CONFIG REQUIRED)
+find_package(Eigen3 CONFIG REQUIRED)
+find_package(embree 3 CONFIG REQUIRED)
+find_package(TBB CONFIG REQUIRED)
+find_package(tomlplusplus CONFIG REQUIRED)
+find_package(fmt CONFIG REQUIRED)
+find_package(nlohmann_json CONFIG REQUIRED)
+find_package(Ceres CONFIG REQUIRED)
+# Debian puts this config into /usr/share/cmake itself, where find_package does not look.
+find_package(OpenColorIO CONFIG REQUIRED PATHS /usr/share/cmake NO_DEFAULT_PATH)

@@ -1,0 +1,20 @@
+# truebox_library(<module> [DEPENDS modules...] [PRIVATE libraries...] SOURCES files...)
+# A module is a folder is a target: truebox_<module>, alias truebox::<module>, headers installed
+# under include/truebox/<module>. DEPENDS are the modules to its left; PRIVATE is its library.
+function(truebox_library module)
+  cmake_parse_arguments(ARG "" "" "DEPENDS;PRIVATE;PUBLIC;SOURCES" ${ARGN})
+  add_library(truebox_${module} STATIC ${ARG_SOURCES})
+  add_library(truebox::${module} ALIAS truebox_${module})
+  set_target_properties(truebox_${module} PROPERTIES EXPORT_NAME ${module} POSITION_INDEPENDENT_CODE ON)
+  target_compile_features(truebox_${module} PUBLIC cxx_std_20)
+  cmake_path(GET CMAKE_CURRENT_SOURCE_DIR PARENT_PATH product)
+  target_include_directories(truebox_${module} PUBLIC
+    $<BUILD_INTERFACE:${product}> $<INSTALL_INTERFACE:include/truebox>)
+  list(TRANSFORM ARG_DEPENDS PREPEND truebox::)
+  target_link_libraries(truebox_${module} PUBLIC ${ARG_DEPENDS} ${ARG_PUBLIC}
+    PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:truebox_warnings>)
+  install(TARGETS truebox_${module} EXPORT trueboxTargets ARCHIVE DESTINATION lib)
+  install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION include/truebox/${module}
+    FILES_MATCHING PATTERN "*.h" PATTERN "codecs.h" EXCLUDE)
+  set_property(GLOBAL APPEND PROPERTY TRUEBOX_MODULES truebox::${module})
+endfunction()

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The readers behind read_image, one library a file. Internal to this folder.
+#pragma once
+
+#include <filesystem>
+
+#include "image/image.h"
+
+namespace truebox::codecs {
+
+Image read_exr(const std::filesystem::path& path);
+Image read_png(const std::filesystem::path& path);
+Image read_tiff(const std::filesystem::path& path);
+
+/// A header may lie: larger images are refused before memory is asked for.
+inline constexpr std::size_t kMaxPixels = std::size_t{1} << 28;
+inline constexpr std::size_t kMaxSamples = std::size_t{1} << 31;
+
+}  // namespace truebox::codecs

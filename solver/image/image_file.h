@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "image/image.h"
+
+namespace truebox {
+
+/// Reads EXR (half or float; first part), PNG (8 or 16 bit) or TIFF (8 or 16 bit, float), by content.
+/// Integer samples keep their digital numbers (DN), nothing is linearised or scaled; palette PNGs
+/// keep their indices. InputError: missing, truncated, or of another kind.
+Image read_image(const std::filesystem::path& path);
+
+/// Writes float32 OpenEXR (ZIP), text attributes included. The file appears under its final name
+/// only when complete. Throws std::runtime_error when the disk refuses.
+void write_exr(const std::filesystem::path& path, const Image& image);
+
+/// Encodes an 8-bit RGB image (3 x width x height interleaved bytes) as PNG.
+std::vector<std::uint8_t> encode_png_rgb8(int width, int height,
+                                          const std::vector<std::uint8_t>& rgb);
+
+/// Writes bytes through a temporary neighbour and a rename, so that no half-written file is left.
+void write_file_atomically(const std::filesystem::path& path, const void* bytes, std::size_t size);
+void write_file_atomically(const std::filesystem::path& path, const std::string& text);
+
+}  // namespace truebox
