@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "difference/difference_map.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "image/spectral_image.h"
+#include "radiometry/input_error.h"
+
+namespace truebox {
+namespace {
+
+struct Pair {
+  const Channel* test;
+  const Channel* reference;
+  double wavelength_nm;
+};
+
+std::string size_text(const Image& image) { return fmt::format("{} x {}", image.width, image.height); }
+
+std::string bands_text(const SpectralChannels& bands) {
+  if (bands.indices.empty()) return "no spectral band";
+  return fmt::format("{} bands {:g} to {:g} nm", bands.indices.size(), bands.wavelengths_nm.front(),
+                     bands.wavelengths_nm.back());
+}
+
+std::string names_text(const Image& image) {
+  std::string text;
+  for (const auto& channel : image.channels) text += (text.empty() ? "" : ", ") + channel.name;
+  return text.empty() ? "no channel" : text;
+}
+
+void require_equal_size(const Image& test, const Image& reference, const char* what) {
+  if (test.width != reference.width || test.height != reference.height)
+    throw MismatchError(fmt::format("{} is {} px, the reference is {} px", what, size_text(test),
+                                    size_text(reference)));
+}
+
+void require_equal_unit(const Image& test, const Image& reference) {
+  const auto t = test.attributes.find("unit");
+  const auto r = reference.attributes.find("unit");
+  if (t == test.attributes.end() || r == reference.attributes.end()) return;
+  if (t->second != r->second)
+    throw MismatchError(
+        fmt::format("the test is in '{}', the reference in '{}'", t->second, r->second));
+}
+
+/// Index of the band within the tolerance of a wavelength, or none.
+std::optional<std::size_t> band_at(const SpectralChannels& bands, double nm, double tolerance_nm) {
+  for (std::size_t i = 0; i < bands.indices.size(); ++i)
+    if (std::abs(bands.wavelengths_nm[i] - nm) <= tolerance_nm) return bands.indices[i];
+  return std::nullopt;
+}
+
+std::vector<Pair> match_bands(const Image& test, const Image& reference,
+                              const DifferenceOptions& options) {
+  const SpectralChannels t = spectral_channels(test), r = spectral_channels(reference);
+  if (t.indices.size() != r.indices.size())
+    throw MismatchError(fmt::format("the test has {}, the reference has {}", bands_text(t),
+                                    bands_text(r)));
+  std::vector<Pair> pairs;
+  for (std::size_t i = 0; i < r.indices.size(); ++i) {
+    const auto found = band_at(t, r.wavelengths_nm[i], options.wavelength_tolerance_nm);
+    if (!found)
+      throw MismatchError(fmt::format("the reference has a band at {:g} nm, the test has none ({})",
+                                      r.wavelengths_nm[i], bands_text(t)));
+    pairs.push_back({&test.channels[*found], &reference.channels[r.indices[i]],
+                     r.wavelengths_nm[i]});
+  }
+  return pairs;
+}
+
+std::vector<Pair> match_names(const Image& test, const Image& reference) {
+  std::vector<Pair> pairs;
+  for (const auto& channel : reference.channels)
+    if (const Channel* found = test.find(channel.name)) pairs.push_back({found, &channel, -1.0});
+  if (pairs.empty() || pairs.size() != reference.channels.size() ||
+      pairs.size() != test.channels.size())
+    throw MismatchError(fmt::format("the test has the channels {}; the reference has {}",
+                                    names_text(test), names_text(reference)));
+  return pairs;
+}
+
+std::vector<Pair> match(const Image& test, const Image& reference,
+                        const DifferenceOptions& options) {
+  const bool spectral = !spectral_channels(reference).indices.empty();
+  if (!spectral && !spectral_channels(test).indices.empty() && options.band_nm)
+    throw MismatchError("the reference has no spectral band, so --band cannot choose one");
+  if (!spectral || spectral_channels(test).indices.empty()) return match_names(test, reference);
+  auto pairs = match_bands(test, reference, options);
+  if (!options.band_nm) return pairs;
+  const Pair* nearest = &pairs.front();
+  for (const Pair& pair : pairs)
+    if (std::abs(pair.wavelength_nm - *options.band_nm) <
+        std::abs(nearest->wavelength_nm - *options.band_nm))
+      nearest = &pair;
+  return {*nearest};
+}
+
+/// The uncertainty that belongs to a channel: same band, else same name.
+const Channel& uncertainty_channel(const Image& uncertainty, const Pair& pair,
+                                   const DifferenceOptions& options) {
+  if (pair.wavelength_nm > 0.0) {
+    const auto found = band_at(spectral_channels(uncertainty), pair.wavelength_nm,
+                               options.wavelength_tolerance_nm);
+    if (found) return uncertainty.channels[*found];
+  } else if (const Channel* found = uncertainty.find(pair.reference->name)) {
+    return *found;
+  }
+  throw MismatchError(fmt::format("channel {} has no uncertainty; there is one for {}",
+                                  pair.reference->name, names_text(uncertainty)));
+}
+
+void add_in_quadrature(std::vector<float>& u, const Channel& other) {
+  if (u.empty()) u.assign(other.samples.size(), 0.0f);
+  for (std::size_t i = 0; i < u.size(); ++i) u[i] = std::hypot(u[i], other.samples[i]);
+}
+
+}  // namespace
+
+double DifferenceChannel::sigmas(std::size_t pixel) const {
+  const double d = difference[pixel], u = standard_uncertainty[pixel];
+  if (!(u >= 0.0)) return std::numeric_limits<double>::quiet_NaN();  // a negative u is no u
+  if (u == 0.0) return d == 0.0 ? 0.0 : std::copysign(std::numeric_limits<double>::infinity(), d);
+  return d / u;
+}
+
+bool DifferenceMap::has_uncertainty() const {
+  for (const auto& channel : channels)
+    if (channel.standard_uncertainty.empty()) return false;
+  return !channels.empty();
+}
+
+DifferenceMap difference_map(const Image& test, const Image& reference,
+                             const DifferenceOptions& options) {
+  require_equal_size(test, reference, "the test");
+  require_equal_unit(test, reference);
+  DifferenceMap map{reference.width, reference.height, "", {}};
+  if (const auto unit = reference.attributes.find("unit"); unit != reference.attributes.end())
+    map.unit = unit->second;
+  for (const Pair& pair : match(test, reference, options)) {
+    DifferenceChannel channel{pair.reference->name, pair.wavelength_nm, {}, {}, {}};
+    channel.reference = pair.reference->samples;
+    channel.difference.resize(channel.reference.size());
+    for (std::size_t i = 0; i < channel.difference.size(); ++i)
+      channel.difference[i] = pair.test->samples[i] - channel.reference[i];
+    for (const Image* u : {options.test_uncertainty, options.reference_uncertainty}) {
+      if (u == nullptr) continue;
+      require_equal_size(*u, reference, "the uncertainty");
+      add_in_quadrature(channel.standard_uncertainty, uncertainty_channel(*u, pair, options));
+    }
+    map.channels.push_back(std::move(channel));
+  }
+  return map;
+}
+
+Image to_image(const DifferenceMap& map) {
+  Image image(map.width, map.height);
+  if (!map.unit.empty()) image.attributes["unit"] = map.unit;
+  image.attributes["content"] = "signed difference, test - reference";
+  for (const auto& channel : map.channels) {
+    image.channels.push_back({channel.name, channel.difference});
+    if (channel.standard_uncertainty.empty()) continue;
+    Channel z{channel.name + ".z", std::vector<float>(channel.difference.size())};
+    for (std::size_t i = 0; i < z.samples.size(); ++i)
+      z.samples[i] = static_cast<float>(channel.sigmas(i));
+    image.attributes["unit:" + z.name] = "1";
+    image.channels.push_back(std::move(z));
+  }
+  return image;
+}
+
+}  // namespace truebox
