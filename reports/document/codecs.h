@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Shared by the writers; internal to this folder.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace truebox::detail {
+
+/// Base64 with padding. Source: RFC 4648, section 4.
+std::string base64_encode(const std::vector<std::uint8_t>& bytes);
+std::optional<std::vector<std::uint8_t>> base64_decode(std::string_view text);
+
+/// Why an SVG is not a plain drawing (elements, attributes and styles that `figures` writes), or
+/// nothing. A report may come from a stranger; what it carries must not run or fetch anything.
+std::optional<std::string> svg_objection(std::string_view svg);
+
+}  // namespace truebox::detail
