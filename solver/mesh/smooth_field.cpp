@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mesh/smooth_field.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+namespace truebox {
+namespace {
+
+using Edge = std::pair<std::uint32_t, std::uint32_t>;
+
+Edge edge_of(std::uint32_t a, std::uint32_t b) { return {std::min(a, b), std::max(a, b)}; }
+
+// Which elements share an edge or a vertex. A contact line shows as an edge between a usable and an
+// unusable element, so that crossing only usable elements keeps both sides of a block apart.
+struct Topology {
+  std::vector<std::vector<std::uint32_t>> patches_at;  // vertex -> elements
+  std::map<Edge, std::array<std::uint32_t, 2>> patches_along;
+  static constexpr std::uint32_t kNone = ~0u;
+
+  explicit Topology(const PatchMesh& mesh) : patches_at(mesh.vertices.size()) {
+    for (std::uint32_t p = 0; p < mesh.size(); ++p) {
+      const auto corners = mesh.corners_of(mesh.patches[p]);
+      for (std::size_t k = 0; k < corners.size(); ++k) {
+        patches_at[corners[k]].push_back(p);
+        auto [it, is_new] = patches_along.try_emplace(
+            edge_of(corners[k], corners[(k + 1) % corners.size()]), std::array{p, kNone});
+        if (!is_new) it->second[1] = p;
+      }
+    }
+  }
+};
+
+// Usable elements within `rings` vertex rings of a vertex that can be reached from `start` over
+// edges between usable elements.
+std::vector<std::uint32_t> reachable(const PatchMesh& mesh, const Topology& topology,
+                                     const std::vector<char>& usable, std::uint32_t start,
+                                     std::uint32_t vertex, int rings) {
+  std::set<std::uint32_t> ring(topology.patches_at[vertex].begin(), topology.patches_at[vertex].end());
+  for (int r = 1; r < rings; ++r) {
+    std::set<std::uint32_t> wider = ring;
+    for (std::uint32_t p : ring)
+      for (std::uint32_t v : mesh.corners_of(mesh.patches[p]))
+        wider.insert(topology.patches_at[v].begin(), topology.patches_at[v].end());
+    ring.swap(wider);
+  }
+  std::vector<std::uint32_t> found{start};
+  std::set<std::uint32_t> seen{start};
+  for (std::size_t next = 0; next < found.size(); ++next) {
+    const auto corners = mesh.corners_of(mesh.patches[found[next]]);
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      const auto& pair =
+          topology.patches_along.at(edge_of(corners[k], corners[(k + 1) % corners.size()]));
+      const std::uint32_t other = pair[0] == found[next] ? pair[1] : pair[0];
+      if (other == Topology::kNone || !usable[other] || !ring.contains(other)) continue;
+      if (seen.insert(other).second) found.push_back(other);
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+using Monomials = Eigen::Matrix<double, 1, 6>;
+
+Monomials monomials(double u, double v) {
+  Monomials m;
+  m << 1.0, u, v, u * u, u * v, v * v;
+  return m;
+}
+
+// Mean of the monomials over an element: edge midpoints of a triangle integrate degree 2 exactly.
+template <class ToPlane>
+Monomials mean_monomials(const PatchMesh& mesh, const Patch& patch, const ToPlane& to_plane) {
+  const auto corners = mesh.corners_of(patch);
+  Monomials sum = Monomials::Zero();
+  double area = 0.0;
+  const Eigen::Vector2d a = to_plane(mesh.vertices[corners[0]]);
+  for (std::size_t i = 2; i < corners.size(); ++i) {
+    const Eigen::Vector2d b = to_plane(mesh.vertices[corners[i - 1]]);
+    const Eigen::Vector2d c = to_plane(mesh.vertices[corners[i]]);
+    const Eigen::Vector2d e = b - a, f = c - a;
+    const double part = 0.5 * (e.x() * f.y() - e.y() * f.x());
+    for (const Eigen::Vector2d& m : {Eigen::Vector2d(0.5 * (a + b)), Eigen::Vector2d(0.5 * (b + c)),
+                                     Eigen::Vector2d(0.5 * (c + a))})
+      sum += part / 3.0 * monomials(m.x(), m.y());
+    area += part;
+  }
+  return sum / area;
+}
+
+}  // namespace
+
+void SmoothField::fit_corner(const PatchMesh& mesh, const std::vector<std::uint32_t>& neighbours,
+                             const BandMatrix& means, Corner& corner) const {
+  const auto k = static_cast<Eigen::Index>(neighbours.size());
+  Eigen::MatrixXd basis(k, 6);
+  Eigen::VectorXd weight(k);
+  BandMatrix values(k, means.cols());
+  const auto to_plane = [&](const Vec3& p) {
+    return Eigen::Vector2d((p - corner.origin).dot(corner.axis_u) / corner.size_m,
+                           (p - corner.origin).dot(corner.axis_v) / corner.size_m);
+  };
+  double largest = 0.0;
+  for (std::uint32_t p : neighbours) largest = std::max(largest, mesh.patches[p].area_m2);
+  for (Eigen::Index i = 0; i < k; ++i) {
+    const Patch& patch = mesh.patches[neighbours[static_cast<std::size_t>(i)]];
+    basis.row(i) = mean_monomials(mesh, patch, to_plane);
+    const double distance = to_plane(patch.centroid).norm();
+    weight[i] = std::sqrt(patch.area_m2 / largest) / (0.25 + distance * distance);
+    values.row(i) = means.row(neighbours[static_cast<std::size_t>(i)]);
+  }
+  corner.coefficients = BandMatrix::Zero(6, means.cols());
+  for (const Eigen::Index terms : {6, 3, 1}) {
+    if (k < terms + (terms > 1 ? 1 : 0)) continue;
+    const Eigen::MatrixXd weighted = weight.asDiagonal() * basis.leftCols(terms);
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(weighted);
+    qr.setThreshold(1e-3);  // elements in one row say nothing of the slope across it
+    if (qr.rank() < terms) continue;
+    corner.coefficients.topRows(terms) = qr.solve(Eigen::MatrixXd(weight.asDiagonal() * values));
+    return;
+  }
+}
+
+SmoothField::SmoothField(const PatchMesh& mesh, const std::vector<char>& usable,
+                         const BandMatrix& means)
+    : mesh_(&mesh), corner_of_(mesh.corners.size(), 0) {
+  const Topology topology(mesh);
+  std::map<std::pair<std::uint32_t, std::vector<std::uint32_t>>, std::uint32_t> known;
+  for (std::uint32_t p = 0; p < mesh.size(); ++p) {
+    const Patch& patch = mesh.patches[p];
+    for (std::uint32_t k = 0; k < patch.corner_count; ++k) {
+      const std::uint32_t vertex = mesh.corners[patch.first_corner + k];
+      auto neighbours = reachable(mesh, topology, usable, p, vertex, 2);
+      if (neighbours.size() < 8) neighbours = reachable(mesh, topology, usable, p, vertex, 3);
+      const auto [it, is_new] =
+          known.try_emplace({vertex, neighbours}, static_cast<std::uint32_t>(corners_.size()));
+      corner_of_[patch.first_corner + k] = it->second;
+      if (!is_new) continue;
+      const Vec3& normal = mesh.plane_of(patch).normal;
+      Corner corner;
+      corner.origin = mesh.vertices[vertex];
+      corner.axis_u = normal.unitOrthogonal();
+      corner.axis_v = normal.cross(corner.axis_u);
+      corner.size_m = std::sqrt(patch.area_m2);
+      fit_corner(mesh, neighbours, means, corner);
+      corners_.push_back(std::move(corner));
+    }
+  }
+  for (const Piece& piece : mesh.pieces) {
+    Bins bins;
+    bins.axis_u = (piece.polygon[1] - piece.polygon[0]).normalized();
+    bins.axis_v = piece.plane.normal.cross(bins.axis_u);
+    Eigen::AlignedBox2d box;
+    const auto flat = [&](const Vec3& p) {
+      return Eigen::Vector2d(p.dot(bins.axis_u), p.dot(bins.axis_v));
+    };
+    for (const Vec3& v : piece.polygon) box.extend(flat(v));
+    const double area = area_vector(piece.polygon).norm();
+    bins.cell_m = std::sqrt(area / std::max(1u, piece.patch_count));
+    bins.origin = box.min().x() * bins.axis_u + box.min().y() * bins.axis_v;
+    bins.columns = 1 + static_cast<int>(box.sizes().x() / bins.cell_m);
+    bins.rows = 1 + static_cast<int>(box.sizes().y() / bins.cell_m);
+    bins.patches.resize(static_cast<std::size_t>(bins.columns) * bins.rows);
+    for (std::uint32_t p = piece.first_patch; p < piece.first_patch + piece.patch_count; ++p) {
+      Eigen::AlignedBox2d extent;
+      for (std::uint32_t v : mesh.corners_of(mesh.patches[p])) extent.extend(flat(mesh.vertices[v]));
+      const auto bin = [&](double value, double low, int count) {
+        return std::clamp(static_cast<int>((value - low) / bins.cell_m), 0, count - 1);
+      };
+      for (int r = bin(extent.min().y(), box.min().y(), bins.rows);
+           r <= bin(extent.max().y(), box.min().y(), bins.rows); ++r)
+        for (int c = bin(extent.min().x(), box.min().x(), bins.columns);
+             c <= bin(extent.max().x(), box.min().x(), bins.columns); ++c)
+          bins.patches[static_cast<std::size_t>(r) * bins.columns + c].push_back(p);
+    }
+    bins_.push_back(std::move(bins));
+  }
+}
+
+std::uint32_t SmoothField::find_patch(std::uint32_t piece, const Vec3& point) const {
+  const Bins& bins = bins_[piece];
+  const Vec3 d = point - bins.origin;
+  const int c = std::clamp(static_cast<int>(d.dot(bins.axis_u) / bins.cell_m), 0, bins.columns - 1);
+  const int r = std::clamp(static_cast<int>(d.dot(bins.axis_v) / bins.cell_m), 0, bins.rows - 1);
+  std::uint32_t nearest = mesh_->pieces[piece].first_patch;
+  double best = -std::numeric_limits<double>::infinity();
+  for (std::uint32_t p : bins.patches[static_cast<std::size_t>(r) * bins.columns + c]) {
+    const auto corners = mesh_->corners_of(mesh_->patches[p]);
+    double depth = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      const Vec3& a = mesh_->vertices[corners[k]];
+      const Vec3& b = mesh_->vertices[corners[(k + 1) % corners.size()]];
+      depth = std::min(depth, mesh_->pieces[piece].plane.normal.cross(b - a).normalized().dot(point - a));
+    }
+    if (depth > best) best = depth, nearest = p;
+    if (depth >= 0.0) break;
+  }
+  return nearest;
+}
+
+void SmoothField::evaluate(std::uint32_t patch_index, const Vec3& point,
+                           Eigen::Ref<Eigen::VectorXd> values) const {
+  const Patch& patch = mesh_->patches[patch_index];
+  const auto corners = mesh_->corners_of(patch);
+  const Vec3& normal = mesh_->plane_of(patch).normal;
+  const std::size_t n = corners.size();
+  std::array<double, 16> depth{}, lambda{};
+  const std::size_t count = std::min<std::size_t>(n, depth.size());
+  const auto vertex = [&](std::size_t k) -> const Vec3& { return mesh_->vertices[corners[k % n]]; };
+  const double floor_m = 1e-9 * std::sqrt(patch.area_m2);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Vec3 along = vertex(k + 1) - vertex(k);
+    depth[k] = std::max(floor_m, normal.cross(along).dot(point - vertex(k)) / along.norm());
+  }
+  double total = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const Vec3 before = (vertex(k) - vertex(k + n - 1)).normalized();
+    const Vec3 after = (vertex(k + 1) - vertex(k)).normalized();
+    lambda[k] = std::max(0.0, normal.dot(before.cross(after))) / (depth[(k + n - 1) % n] * depth[k]);
+    total += lambda[k];
+  }
+  values.setZero();
+  for (std::size_t k = 0; k < count; ++k) {
+    if (lambda[k] == 0.0) continue;
+    const Corner& corner = corners_[corner_of_[patch.first_corner + k]];
+    const Vec3 d = (point - corner.origin) / corner.size_m;
+    values.noalias() += lambda[k] / total *
+                        (monomials(d.dot(corner.axis_u), d.dot(corner.axis_v)) * corner.coefficients)
+                            .transpose();
+  }
+  values = values.cwiseMax(0.0);
+}
+
+}  // namespace truebox

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "radiometry/spectral.h"
+#include "radiometry/wavelength_grid.h"
+#include "scene/polygon.h"
+
+namespace truebox {
+
+/// Optical properties of an opaque Lambertian surface, one value a band; the back is black.
+struct Material {
+  std::string name;
+  Reflectance reflectance;   ///< 0 <= rho < 1
+  RadiantExitance exitance;  ///< own emission, W m^-2 nm^-1 (or relative, where its source says so)
+
+  bool emits() const;
+};
+
+/// A flat part of the scene. A non-planar quad is cut along its 0-2 diagonal, a hole is cut out:
+/// `pieces` are planar and convex.
+struct Surface {
+  std::string name;
+  std::size_t material = 0;
+  std::vector<Polygon> pieces;
+  bool is_opening = false;  ///< nothing is there: light leaves, cameras and rays pass
+};
+
+/// A pinhole camera as a scene file gives it; lengths in m.
+struct CameraDescription {
+  Vec3 position_m = Vec3::Zero();
+  Vec3 direction = Vec3::UnitZ();
+  Vec3 up = Vec3::UnitY();
+  double focal_length_m = 0.035;
+  std::array<double, 2> film_m = {0.025, 0.025};
+  std::array<int, 2> pixels = {512, 512};
+};
+
+/// Lambertian surfaces, their materials in each band, and the cameras that look at them. SI units.
+struct Scene {
+  std::string path;               ///< the file it came from
+  double metres_per_unit = 1.0;   ///< of the file's length unit
+  std::string length_unit = "m";  ///< as the file wrote it
+  WavelengthGrid bands;
+  std::vector<Material> materials;
+  std::vector<Surface> surfaces;  ///< openings last
+  std::map<std::string, CameraDescription> cameras;
+
+  const Material& material_of(const Surface& surface) const { return materials[surface.material]; }
+  double diameter_m() const;  ///< diagonal of the bounding box of the surfaces
+};
+
+}  // namespace truebox

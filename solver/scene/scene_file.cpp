@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/scene_file.h"
+
+#include <cmath>
+#include <set>
+#include <sstream>
+#include <toml++/toml.h>
+
+#include "radiometry/input_error.h"
+#include "radiometry/table_file.h"
+
+namespace truebox {
+namespace {
+
+std::string described(const toml::node& node) {
+  std::ostringstream text;
+  if (node.is_table()) return "a table";
+  text << toml::node_view<const toml::node>(node);
+  std::string value = text.str();
+  if (value.size() > 60) value = value.substr(0, 57) + "...";
+  return value;
+}
+
+// Reads one scene file; keeps the path so that every mistake can name its place.
+class Reader {
+ public:
+  explicit Reader(const std::filesystem::path& path) : path_(path) {}
+
+  Scene read() {
+    const toml::table root = parse();
+    allow_keys(root, {"length_unit", "bands", "materials", "surfaces", "openings", "cameras"});
+    scene_.path = path_.string();
+    read_unit(root);
+    read_bands(root);
+    read_materials(root);
+    read_surfaces(root, "surfaces", false);
+    read_surfaces(root, "openings", true);
+    read_cameras(root);
+    return std::move(scene_);
+  }
+
+ private:
+  [[noreturn]] void fail(const toml::node& node, const std::string& expected,
+                         const std::string& found) const {
+    throw InputError(path_.string(), static_cast<int>(node.source().begin.line), expected, found);
+  }
+
+  toml::table parse() const {
+    if (!std::filesystem::is_regular_file(path_))
+      throw InputError(path_.string(), 0, "a scene file", "no such file");
+    try {
+      return toml::parse_file(path_.string());
+    } catch (const toml::parse_error& error) {
+      throw InputError(path_.string(), static_cast<int>(error.source().begin.line), "valid TOML",
+                       std::string(error.description()));
+    }
+  }
+
+  void allow_keys(const toml::table& table, std::set<std::string> known) const {
+    for (const auto& [key, node] : table) {
+      if (known.contains(std::string(key.str()))) continue;
+      std::string list;
+      for (const auto& name : known) list += (list.empty() ? "" : ", ") + name;
+      throw InputError(path_.string(), static_cast<int>(key.source().begin.line),
+                       "one of the keys " + list, "\"" + std::string(key.str()) + "\"");
+    }
+  }
+
+  const toml::node& need(const toml::table& table, const char* key, const char* what) const {
+    const toml::node* node = table.get(key);
+    if (!node) fail(table, what, std::string("no key \"") + key + "\"");
+    return *node;
+  }
+
+  double number(const toml::node& node, const char* what = "a finite number") const {
+    const auto value = node.value<double>();
+    if (!value || node.is_string() || node.is_boolean() || !std::isfinite(*value))
+      fail(node, what, described(node));
+    return *value;
+  }
+
+  std::string text(const toml::node& node, const char* what) const {
+    if (!node.is_string()) fail(node, what, described(node));
+    return *node.value<std::string>();
+  }
+
+  const toml::table& table_of(const toml::node& node, const char* what) const {
+    if (!node.is_table()) fail(node, what, described(node));
+    return *node.as_table();
+  }
+
+  std::vector<double> numbers(const toml::node& node, const char* what) const {
+    if (!node.is_array()) fail(node, what, described(node));
+    std::vector<double> values;
+    for (const auto& item : *node.as_array()) values.push_back(number(item));
+    return values;
+  }
+
+  Vec3 vector(const toml::node& node, const char* what) const {
+    const auto values = numbers(node, what);
+    if (values.size() != 3) fail(node, what, std::to_string(values.size()) + " numbers");
+    return {values[0], values[1], values[2]};
+  }
+
+  void read_unit(const toml::table& root) {
+    static const std::map<std::string, double> kMetres = {
+        {"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"in", 0.0254}};
+    const toml::node& node = need(root, "length_unit", "length_unit = \"m\", \"cm\", \"mm\" or \"in\"");
+    scene_.length_unit = text(node, "a unit in quotes");
+    const auto found = kMetres.find(scene_.length_unit);
+    if (found == kMetres.end()) fail(node, "\"m\", \"cm\", \"mm\" or \"in\"", described(node));
+    scene_.metres_per_unit = found->second;
+  }
+
+  void read_bands(const toml::table& root) {
+    const toml::node* node = root.get("bands");
+    if (!node) {  // a grey scene: one band, and no spectrum may ask for more
+      scene_.bands = WavelengthGrid::from_centres({550.0});
+      grey_ = true;
+      return;
+    }
+    const toml::table& bands = table_of(*node, "a table [bands]");
+    allow_keys(bands, {"from_nm", "to_nm", "step_nm", "centres_nm"});
+    try {
+      if (const toml::node* centres = bands.get("centres_nm")) {
+        scene_.bands = WavelengthGrid::from_centres(numbers(*centres, "a list of band centres in nm"));
+      } else {
+        const char* what = "from_nm, to_nm and step_nm, or centres_nm = [...]";
+        scene_.bands = WavelengthGrid::uniform(number(need(bands, "from_nm", what)),
+                                               number(need(bands, "to_nm", what)),
+                                               number(need(bands, "step_nm", what)));
+      }
+    } catch (const std::invalid_argument& error) {
+      fail(*node, "usable bands", error.what());
+    }
+  }
+
+  std::vector<double> spectrum(const toml::node& node, const char* what) {
+    if (!node.is_table()) return std::vector<double>(scene_.bands.size(), number(node, what));
+    if (grey_) fail(node, "[bands], because a material has a spectrum", "no [bands]");
+    const toml::table& table = *node.as_table();
+    try {
+      if (table.contains("file")) {
+        allow_keys(table, {"file", "column"});
+        const auto file = path_.parent_path() / text(need(table, "file", what), "a file name");
+        const auto column = text(need(table, "column", "column = \"name\""), "a column name");
+        return sample_bands(spectrum_from_table(read_table(file), column), scene_.bands);
+      }
+      allow_keys(table, {"nm", "value"});
+      return sample_bands(
+          TabulatedSpectrum(numbers(need(table, "nm", what), "a list of wavelengths in nm"),
+                            numbers(need(table, "value", what), "a list of values")),
+          scene_.bands);
+    } catch (const std::invalid_argument& error) {
+      fail(node, "a sorted spectrum with as many values as wavelengths", error.what());
+    }
+  }
+
+  void read_materials(const toml::table& root) {
+    const auto& materials = table_of(need(root, "materials", "a table [materials.NAME]"), "tables");
+    for (const auto& [key, node] : materials) {
+      const toml::table& table = table_of(node, "a table [materials.NAME]");
+      allow_keys(table, {"reflectance", "exitance"});
+      Material material;
+      material.name = std::string(key.str());
+      const toml::node& rho =
+          need(table, "reflectance", "reflectance = number, { nm, value } or { file, column }");
+      material.reflectance = Reflectance(spectrum(rho, "a reflectance"));
+      for (double r : material.reflectance.values)
+        if (r < 0.0 || r >= 1.0)
+          fail(rho, "0 <= reflectance < 1 (at 1 and above, energy would be created)",
+               std::to_string(r));
+      material.exitance = RadiantExitance(scene_.bands.size(), 0.0);
+      if (const toml::node* exitance = table.get("exitance")) {
+        material.exitance = RadiantExitance(spectrum(*exitance, "an exitance"));
+        for (double e : material.exitance.values)
+          if (e < 0.0) fail(*exitance, "exitance >= 0", std::to_string(e));
+      }
+      scene_.materials.push_back(std::move(material));
+    }
+  }
+
+  std::size_t material_index(const toml::node& node) const {
+    const std::string name = text(node, "a material's name in quotes");
+    std::string known;
+    for (std::size_t i = 0; i < scene_.materials.size(); ++i) {
+      if (scene_.materials[i].name == name) return i;
+      known += (known.empty() ? "" : ", ") + scene_.materials[i].name;
+    }
+    fail(node, "one of the materials " + known, "\"" + name + "\"");
+  }
+
+  Polygon polygon(const toml::node& node) const {
+    if (!node.is_array() || node.as_array()->size() < 3)
+      fail(node, "at least three vertices [[x, y, z], ...]", described(node));
+    Polygon vertices;
+    for (const auto& item : *node.as_array())
+      vertices.push_back(scene_.metres_per_unit * vector(item, "a vertex [x, y, z]"));
+    const double size = diameter_m(vertices);
+    if (!(area_vector(vertices).norm() > 1e-14 * size * size))
+      fail(node, "a polygon with an area", "one without");
+    return vertices;
+  }
+
+  static bool is_planar(const Polygon& polygon) {
+    const Plane plane = plane_of(polygon);
+    const double tolerance = 1e-9 * diameter_m(polygon);
+    for (const Vec3& v : polygon)
+      if (std::abs(plane.distance_m(v)) > tolerance) return false;
+    return true;
+  }
+
+  std::vector<Polygon> pieces(const toml::table& table) const {
+    const toml::node& node = need(table, "vertices", "vertices = [[x, y, z], ...]");
+    const Polygon outline = polygon(node);
+    std::vector<Polygon> holes;
+    if (const toml::node* list = table.get("holes")) {
+      if (!list->is_array()) fail(*list, "holes = [[[x, y, z], ...], ...]", described(*list));
+      for (const auto& item : *list->as_array()) holes.push_back(polygon(item));
+    }
+    if (!is_planar(outline)) {
+      if (outline.size() != 4 || !holes.empty())
+        fail(node, "a planar polygon (only a quad without holes may be bent)", "a bent one");
+      return {{outline[0], outline[1], outline[2]}, {outline[0], outline[2], outline[3]}};
+    }
+    for (const Polygon& hole : holes)
+      for (const Vec3& v : hole)
+        if (std::abs(plane_of(outline).distance_m(v)) > 1e-9 * diameter_m(outline))
+          fail(*table.get("holes"), "holes in the plane of their surface", "a vertex off it");
+    auto parts = convex_pieces(outline, holes);
+    if (parts.empty()) fail(node, "an outline that does not cross itself and is not all hole", "neither");
+    return parts;
+  }
+
+  void read_surfaces(const toml::table& root, const char* key, bool opening) {
+    const toml::node* list = root.get(key);
+    if (!list && opening) return;
+    if (!list) fail(root, "[[surfaces]]", "none");
+    if (!list->is_array_of_tables())
+      fail(*list, std::string("tables [[") + key + "]]", described(*list));
+    if (opening) scene_.materials.push_back(void_material());
+    for (const auto& item : *list->as_array()) {
+      const toml::table& table = *item.as_table();
+      allow_keys(table, opening ? std::set<std::string>{"name", "vertices", "holes"}
+                                : std::set<std::string>{"name", "material", "vertices", "holes",
+                                                        "two_sided"});
+      Surface surface;
+      surface.name = text(need(table, "name", "name = \"...\""), "a name in quotes");
+      if (!names_.insert(surface.name).second)
+        fail(*table.get("name"), "a name used once", "\"" + surface.name + "\" again");
+      surface.is_opening = opening;
+      surface.material = opening ? scene_.materials.size() - 1
+                                 : material_index(need(table, "material", "material = \"...\""));
+      surface.pieces = pieces(table);
+      if (const toml::node* two_sided = table.get("two_sided")) {
+        if (!two_sided->is_boolean()) fail(*two_sided, "true or false", described(*two_sided));
+        if (*two_sided->value<bool>()) add_back_sides(surface.pieces);
+      }
+      scene_.surfaces.push_back(std::move(surface));
+    }
+  }
+
+  static void add_back_sides(std::vector<Polygon>& pieces) {
+    const std::size_t count = pieces.size();
+    for (std::size_t i = 0; i < count; ++i)
+      pieces.push_back(Polygon(pieces[i].rbegin(), pieces[i].rend()));
+  }
+
+  Material void_material() const {
+    return {"(opening)", Reflectance(scene_.bands.size(), 0.0),
+            RadiantExitance(scene_.bands.size(), 0.0)};
+  }
+
+  void read_cameras(const toml::table& root) {
+    const toml::node* node = root.get("cameras");
+    if (!node) return;
+    for (const auto& [key, item] : table_of(*node, "tables [cameras.NAME]")) {
+      const toml::table& table = table_of(item, "a table [cameras.NAME]");
+      allow_keys(table, {"position", "direction", "up", "focal_length_mm", "film_mm", "pixels"});
+      scene_.cameras[std::string(key.str())] = camera(table);
+    }
+  }
+
+  CameraDescription camera(const toml::table& table) const {
+    CameraDescription camera;
+    camera.position_m = scene_.metres_per_unit *
+                        vector(need(table, "position", "position = [x, y, z]"), "[x, y, z]");
+    camera.direction = vector(need(table, "direction", "direction = [x, y, z]"), "[x, y, z]");
+    camera.up = vector(need(table, "up", "up = [x, y, z]"), "[x, y, z]");
+    if (camera.direction.cross(camera.up).norm() < 1e-9 * camera.direction.norm() * camera.up.norm())
+      fail(table, "a direction that is not parallel to up", "parallel vectors");
+    const toml::node& focal = need(table, "focal_length_mm", "focal_length_mm = number");
+    camera.focal_length_m = 1e-3 * number(focal);
+    if (camera.focal_length_m <= 0.0) fail(focal, "a positive focal length", described(focal));
+    const toml::node& film = need(table, "film_mm", "film_mm = [width, height]");
+    const auto size_mm = numbers(film, "film_mm = [width, height]");
+    if (size_mm.size() != 2 || size_mm[0] <= 0.0 || size_mm[1] <= 0.0)
+      fail(film, "two positive lengths", described(film));
+    camera.film_m = {1e-3 * size_mm[0], 1e-3 * size_mm[1]};
+    const toml::node& grid = need(table, "pixels", "pixels = [width, height]");
+    const auto pixels = numbers(grid, "pixels = [width, height]");
+    for (double p : pixels)
+      if (p < 1.0 || p > 32768.0 || p != std::floor(p)) fail(grid, "1 to 32768 pixels", described(grid));
+    if (pixels.size() != 2) fail(grid, "pixels = [width, height]", described(grid));
+    camera.pixels = {static_cast<int>(pixels[0]), static_cast<int>(pixels[1])};
+    return camera;
+  }
+
+  std::filesystem::path path_;
+  Scene scene_;
+  std::set<std::string> names_;
+  bool grey_ = false;
+};
+
+}  // namespace
+
+Scene read_scene(const std::filesystem::path& path) { return Reader(path).read(); }
+
+}  // namespace truebox

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "transport/form_factor.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "transport/quadrature.h"
+
+namespace truebox {
+namespace {
+
+constexpr double kHorizonTolerance = 1e-13;  // of the polygon's size: rounding of its vertices
+
+double contour_sum(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon) {
+  double sum = 0.0;
+  Vec3 a = polygon.back() - point;
+  for (const Vec3& vertex : polygon) {
+    const Vec3 b = vertex - point;
+    const Vec3 c = a.cross(b);
+    const double sine = c.norm();
+    if (sine > 0.0) sum += std::atan2(sine, a.dot(b)) * normal.dot(c) / sine;
+    a = b;
+  }
+  return std::max(0.0, -sum / (2.0 * std::numbers::pi));
+}
+
+double radius_about(std::span<const Vec3> polygon, const Vec3& centre) {
+  double radius = 0.0;
+  for (const Vec3& v : polygon) radius = std::max(radius, (v - centre).norm());
+  return radius;
+}
+
+double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const Vec3 along = b - a;
+  const double t = std::clamp(along.dot(p - a) / along.squaredNorm(), 0.0, 1.0);
+  return (p - a - t * along).norm();
+}
+
+// Gauss points needed when the nearest singularity lies `distance` from the centre of an interval
+// of half-length `radius`: the error falls like rho^-2n, rho the Bernstein ellipse through it.
+int gauss_points(double radius, double distance, double tolerance) {
+  const double x = distance / radius;
+  if (x <= 1.02) return kMaxGaussPoints + 1;
+  const double rho = x + std::sqrt(x * x - 1.0);
+  return std::max(1, static_cast<int>(std::ceil(-0.5 * std::log(0.1 * tolerance) / std::log(rho))));
+}
+
+// Integral over a triangle (collapsed Gauss rule) or a convex quad (bilinear Gauss rule) of
+// Lambert's formula; other polygons as a fan of triangles.
+double integrate_quad(const std::array<Vec3, 4>& q, const Vec3& normal, std::span<const Vec3> source,
+                      int points) {
+  const GaussRule& rule = gauss_rule(points);
+  double sum = 0.0;
+  for (int j = 0; j < points; ++j)
+    for (int i = 0; i < points; ++i) {
+      const double u = rule.nodes[i], v = rule.nodes[j];
+      const Vec3 x = (1 - v) * ((1 - u) * q[0] + u * q[1]) + v * ((1 - u) * q[3] + u * q[2]);
+      const Vec3 du = (1 - v) * (q[1] - q[0]) + v * (q[2] - q[3]);
+      const Vec3 dv = (1 - u) * (q[3] - q[0]) + u * (q[2] - q[1]);
+      const double area = normal.dot(du.cross(dv));
+      sum += rule.weights[i] * rule.weights[j] * area * contour_sum(x, normal, source);
+    }
+  return sum;
+}
+
+double lambert_quadrature(const PlanarPolygon& receiver, const PlanarPolygon& source, int points) {
+  const Vec3& normal = receiver.plane.normal;
+  const Polygon& p = receiver.vertices;
+  if (points == 1) return receiver.area_m2 * contour_sum(receiver.centroid, normal, source.vertices);
+  if (p.size() == 4)
+    return integrate_quad({p[0], p[1], p[2], p[3]}, normal, source.vertices, points);
+  double sum = 0.0;
+  for (std::size_t k = 2; k < p.size(); ++k)
+    sum += integrate_quad({p[0], p[k - 1], p[k], p[0]}, normal, source.vertices, points);
+  return sum;
+}
+
+// integral_0^L ln(|x - (b0 + t u)| / scale) dt in closed form.
+double log_integral(const Vec3& x, const Vec3& b0, const Vec3& u, double length, double scale) {
+  const Vec3 d = x - b0;
+  const double p = d.dot(u);
+  const double h2 = std::max(0.0, (d - p * u).squaredNorm());
+  const double h = std::sqrt(h2);
+  const auto primitive = [&](double t) {
+    const double r2 = h2 + t * t;
+    const double logarithm = r2 > 0.0 ? 0.5 * t * std::log(r2 / (scale * scale)) : 0.0;
+    return logarithm - t + (h > 0.0 ? h * std::atan2(t, h) : 0.0);
+  };
+  return primitive(length - p) - primitive(-p);
+}
+
+struct EdgePair {
+  Vec3 a0, a1, b0, b1, u;  // u: unit vector of b
+  double length_b, scale, tolerance;
+  bool parallel;
+};
+
+// Outer integral over the part [s0, s1] of edge a, halved until Gauss converges; near a touching
+// point the halving is geometric, and what is left below 2^-48 of the edge is negligible.
+double outer_integral(const EdgePair& e, double s0, double s1, int depth) {
+  const Vec3 p0 = e.a0 + s0 * (e.a1 - e.a0), p1 = e.a0 + s1 * (e.a1 - e.a0);
+  const Vec3 middle = 0.5 * (p0 + p1);
+  const double radius = 0.5 * (p1 - p0).norm();
+  // Between parallel lines only the end points are singular; otherwise the whole segment is.
+  const double distance =
+      e.parallel ? std::min((middle - e.b0).norm(), (middle - e.b1).norm())
+                 : distance_to_segment(middle, e.b0, e.b1);
+  int points = gauss_points(radius, distance, e.tolerance);
+  if (points > 12 && depth < 48) {
+    const double half = 0.5 * (s0 + s1);
+    return outer_integral(e, s0, half, depth + 1) + outer_integral(e, half, s1, depth + 1);
+  }
+  points = std::min(points, 12);
+  const GaussRule& rule = gauss_rule(points);
+  double sum = 0.0;
+  for (int i = 0; i < points; ++i)
+    sum += rule.weights[i] *
+           log_integral(p0 + rule.nodes[i] * (p1 - p0), e.b0, e.u, e.length_b, e.scale);
+  return sum * 2.0 * radius;
+}
+
+double double_contour(const PlanarPolygon& first, const PlanarPolygon& second, double tolerance) {
+  const Polygon &i = first.vertices, &j = second.vertices;
+  const double scale = std::max((first.centroid - second.centroid).norm(), 1e-300);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < i.size(); ++k)
+    for (std::size_t l = 0; l < j.size(); ++l) {
+      EdgePair e{i[k], i[(k + 1) % i.size()], j[l], j[(l + 1) % j.size()], {}, 0, scale, tolerance,
+                 false};
+      const double length_a = (e.a1 - e.a0).norm();
+      e.length_b = (e.b1 - e.b0).norm();
+      if (length_a == 0.0 || e.length_b == 0.0) continue;
+      e.u = (e.b1 - e.b0) / e.length_b;
+      const Vec3 w = (e.a1 - e.a0) / length_a;
+      const double cosine = e.u.dot(w);
+      if (std::abs(cosine) < 1e-15) continue;
+      e.parallel = w.cross(e.u).norm() < 1e-12;
+      sum += cosine * outer_integral(e, 0.0, 1.0, 0);
+    }
+  return std::max(0.0, sum / (2.0 * std::numbers::pi));
+}
+
+// Both polygons wholly in front of each other. The smaller one receives.
+double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tolerance) {
+  const bool swap = j.radius_m < i.radius_m ||
+                    (j.radius_m == i.radius_m && j.centroid.sum() < i.centroid.sum());
+  const PlanarPolygon& receiver = swap ? j : i;
+  const PlanarPolygon& source = swap ? i : j;
+  double nearest = std::numeric_limits<double>::infinity();
+  const double apart = (receiver.centroid - source.centroid).norm() - source.radius_m;
+  if (apart > 10.0 * receiver.radius_m) {
+    nearest = apart;  // a lower bound is enough far away
+  } else {
+    const Polygon& p = source.vertices;
+    for (std::size_t k = 0; k < p.size(); ++k)
+      nearest = std::min(nearest, distance_to_segment(receiver.centroid, p[k], p[(k + 1) % p.size()]));
+  }
+  const int points = gauss_points(receiver.radius_m, nearest, tolerance);
+  return points <= 8 ? lambert_quadrature(receiver, source, points)
+                     : double_contour(receiver, source, tolerance);
+}
+
+}  // namespace
+
+double point_to_polygon(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon) {
+  const Plane horizon{normal, normal.dot(point)};
+  bool below = false;
+  double reach = 0.0;
+  for (const Vec3& v : polygon) {
+    below |= horizon.distance_m(v) < 0.0;
+    reach = std::max(reach, (v - point).norm());
+  }
+  if (!below) return contour_sum(point, normal, polygon);
+  Polygon above;
+  clip(polygon, horizon, kHorizonTolerance * reach, above);
+  return above.empty() ? 0.0 : contour_sum(point, normal, above);
+}
+
+PlanarPolygon::PlanarPolygon(Polygon polygon)
+    : vertices(std::move(polygon)),
+      plane(plane_of(vertices)),
+      centroid(truebox::centroid(vertices)),
+      area_m2(area_vector(vertices).norm()),
+      radius_m(radius_about(vertices, centroid)) {}
+
+double exchange_area_m2(const PlanarPolygon& i, const PlanarPolygon& j, double relative_tolerance) {
+  const auto side = [](const PlanarPolygon& polygon, const Plane& plane) {
+    const double tolerance =
+        kHorizonTolerance * (std::abs(plane.distance_m(polygon.centroid)) + 2.0 * polygon.radius_m);
+    int seen = 0;  // bit 0: some above the horizon, bit 1: some below
+    for (const Vec3& v : polygon.vertices) {
+      const double d = plane.distance_m(v);
+      seen |= (d > tolerance ? 1 : 0) | (d < -tolerance ? 2 : 0);
+    }
+    return seen;
+  };
+  const int side_i = side(i, j.plane), side_j = side(j, i.plane);
+  if (!(side_i & 1) || !(side_j & 1)) return 0.0;
+  if (side_i == 3 || side_j == 3) {
+    Polygon part_i = i.vertices, part_j = j.vertices;
+    if (side_i == 3) clip(i.vertices, j.plane, kHorizonTolerance * i.radius_m, part_i);
+    if (side_j == 3) clip(j.vertices, i.plane, kHorizonTolerance * j.radius_m, part_j);
+    if (part_i.empty() || part_j.empty()) return 0.0;
+    return unoccluded_m2(PlanarPolygon(std::move(part_i)), PlanarPolygon(std::move(part_j)),
+                         relative_tolerance);
+  }
+  return unoccluded_m2(i, j, relative_tolerance);
+}
+
+}  // namespace truebox

@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "transport/form_factors.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <mutex>
+#include <numbers>
+#include <numeric>
+#include <stdexcept>
+
+#include "transport/form_factor.h"
+
+namespace truebox {
+namespace {
+
+// Which side of each piece's plane a patch is on: bit 0 some in front, bit 1 some behind.
+using Sides = std::vector<unsigned char>;
+
+struct PatchShape {
+  PlanarPolygon polygon;
+  std::vector<Vec3> samples;  // quasi-random, uniform over the polygon
+  Eigen::AlignedBox3d box;
+  Sides sides;  // of every piece
+};
+
+constexpr int kSampleWindows = 64;
+
+std::uint64_t hash(std::uint64_t x) {  // splitmix64 (Steele et al. 2014)
+  x += 0x9e3779b97f4a7c15ull;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
+  return x ^ (x >> 31);
+}
+
+double unit_interval(std::uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1p-53; }
+
+// A point of a convex polygon, uniform for uniform (u, v): a triangle of the fan by area, then the
+// square-root map.
+Vec3 sample_polygon(const Polygon& p, double u, double v) {
+  double total = 0.0;
+  std::array<double, 16> area{};
+  const std::size_t fan = std::min<std::size_t>(p.size() - 2, area.size());
+  for (std::size_t i = 0; i < fan; ++i)
+    total += area[i] = (p[i + 1] - p[0]).cross(p[i + 2] - p[0]).norm();
+  double pick = u * total;
+  std::size_t i = 0;
+  while (i + 1 < fan && pick > area[i]) pick -= area[i++];
+  const double s = std::sqrt(std::clamp(pick / area[i], 0.0, 1.0));
+  return p[0] + s * ((1.0 - v) * (p[i + 1] - p[0]) + v * (p[i + 2] - p[0]));
+}
+
+class Builder {
+ public:
+  Builder(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+          const FormFactorOptions& options)
+      : mesh_(mesh), scene_(scene), visibility_(visibility), options_(options) {
+    tolerance_m_ = 1e-9 * scene.diameter_m();
+    make_shapes();
+  }
+
+  FormFactors build() {
+    const auto n = static_cast<Eigen::Index>(mesh_.size());
+    FormFactors result;
+    result.area_m2.resize(n);
+    for (Eigen::Index i = 0; i < n; ++i) result.area_m2[i] = mesh_.patches[i].area_m2;
+    result.exchange_area_m2 = Eigen::MatrixXd::Zero(n, n);
+    sampled_.assign(static_cast<std::size_t>(n), {});
+    std::atomic<Eigen::Index> done{0};
+    std::mutex progress_lock;
+    tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, n, 8), [&](const auto& range) {
+      for (Eigen::Index i = range.begin(); i < range.end(); ++i) fill_row(i, result.exchange_area_m2);
+      const Eigen::Index count = done += range.end() - range.begin();
+      if (options_.progress) {
+        const std::lock_guard guard(progress_lock);
+        options_.progress("form factors", static_cast<double>(count) / static_cast<double>(n));
+      }
+    });
+    for (Eigen::Index i = 0; i < n; ++i)
+      for (Eigen::Index j = i + 1; j < n; ++j)
+        result.exchange_area_m2(i, j) = result.exchange_area_m2(j, i);
+    result.summary.pairs_unoccluded = unoccluded_;
+    result.summary.pairs_hidden = hidden_;
+    result.summary.pairs_sampled = partial_;
+    result.summary.rays = rays_;
+    mark_buried(result);
+    test_closure(result);
+    if (result.summary.closed) repair(result);
+    result.summary.row_sum_max = 0.0;
+    for (Eigen::Index i = 0; i < n; ++i)
+      result.summary.row_sum_max =
+          std::max(result.summary.row_sum_max,
+                   result.exchange_area_m2.col(i).sum() / result.area_m2[i]);
+    return result;
+  }
+
+ private:
+  void make_shapes() {
+    shapes_.reserve(mesh_.size());
+    Polygon polygon;
+    for (std::size_t i = 0; i < mesh_.size(); ++i) {
+      mesh_.polygon_of(mesh_.patches[i], polygon);
+      PatchShape& shape = shapes_.emplace_back(PatchShape{PlanarPolygon(polygon), {}, {}, {}});
+      make_samples(shape, i);
+      for (const Vec3& v : polygon) shape.box.extend(v);
+      shape.sides.assign(mesh_.pieces.size(), 0);
+      for (std::size_t p = 0; p < mesh_.pieces.size(); ++p)
+        for (const Vec3& v : polygon) {
+          const double d = mesh_.pieces[p].plane.distance_m(v);
+          if (d > tolerance_m_) shape.sides[p] |= 1;
+          if (d < -tolerance_m_) shape.sides[p] |= 2;
+        }
+    }
+    for (std::uint32_t p = 0; p < mesh_.pieces.size(); ++p)
+      if (!scene_.surfaces[mesh_.pieces[p].surface].is_opening) blockers_.push_back(p);
+    boxes_.resize(mesh_.pieces.size());
+    piece_sides_.resize(mesh_.pieces.size());
+    for (std::size_t p = 0; p < mesh_.pieces.size(); ++p) {
+      for (const Vec3& v : mesh_.pieces[p].polygon) boxes_[p].extend(v);
+      piece_sides_[p].assign(mesh_.pieces.size(), 0);
+      for (std::size_t q = 0; q < mesh_.pieces.size(); ++q)
+        for (const Vec3& v : mesh_.pieces[p].polygon)
+          if (mesh_.pieces[q].plane.distance_m(v) > tolerance_m_) piece_sides_[p][q] |= 1;
+    }
+  }
+
+  // Whether any surface can come between patches i and j.
+  bool may_be_occluded(std::size_t i, std::size_t j) const {
+    const std::uint32_t pi = mesh_.patches[i].piece, pj = mesh_.patches[j].piece;
+    const Eigen::AlignedBox3d hull = shapes_[i].box.merged(shapes_[j].box);
+    for (std::uint32_t b : blockers_) {
+      if (b == pi || b == pj) continue;
+      if ((shapes_[i].sides[b] | shapes_[j].sides[b]) != 3) continue;  // both on one side of it
+      if (!(piece_sides_[b][pi] & 1) || !(piece_sides_[b][pj] & 1)) continue;  // behind one of them
+      if (separated(boxes_[b], hull)) continue;
+      return true;
+    }
+    return false;
+  }
+
+  bool separated(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b) const {
+    return ((a.min() - b.max()).array() > tolerance_m_).any() ||
+           ((b.min() - a.max()).array() > tolerance_m_).any();
+  }
+
+  // An additive recurrence: every window of it is evenly spread, so each pair takes its own.
+  void make_samples(PatchShape& shape, std::size_t i) const {
+    constexpr double kPlastic = 1.32471795724474602596;  // root of x^3 = x + 1 (Roberts 2018)
+    std::uint64_t state = hash(options_.seed ^ hash(i));
+    double u = unit_interval(state);
+    double v = unit_interval(hash(state));
+    for (int k = 0; k < kSampleWindows + options_.rays; ++k) {
+      u += 1.0 / kPlastic;
+      v += 1.0 / (kPlastic * kPlastic);
+      u -= std::floor(u);
+      v -= std::floor(v);
+      shape.samples.push_back(sample_polygon(shape.polygon.vertices, u, v));
+    }
+  }
+
+  // Kernel-weighted visible share of the pair from quasi-random ray pairs.
+  double visible_share(std::size_t i, std::size_t j, std::size_t& rays) const {
+    const Vec3& ni = shapes_[i].polygon.plane.normal;
+    const Vec3& nj = shapes_[j].polygon.plane.normal;
+    const std::uint64_t bits = hash(options_.seed ^ hash(i * mesh_.size() + j));
+    const Vec3* from = shapes_[i].samples.data() + bits % kSampleWindows;
+    const Vec3* to = shapes_[j].samples.data() + (bits >> 20) % kSampleWindows;
+    const auto count = static_cast<unsigned>(options_.rays);
+    const auto shift = static_cast<unsigned>((bits >> 40) % count);
+    double seen = 0.0, total = 0.0;
+    for (unsigned k = 0; k < count; ++k) {
+      if (k == count / 2 && (seen == 0.0 || seen == total)) break;
+      const Vec3& a = from[k];
+      const Vec3& b = to[(7 * k + shift) % count];  // another order, or the two walk in step
+      const Vec3 r = b - a;
+      const double cos_i = ni.dot(r), cos_j = -nj.dot(r);
+      if (cos_i <= 0.0 || cos_j <= 0.0) continue;
+      const double r2 = r.squaredNorm();
+      const double weight = cos_i * cos_j / (r2 * r2);
+      total += weight;
+      ++rays;
+      if (!visibility_.occluded(a, ni, b, nj)) seen += weight;
+    }
+    return total > 0.0 ? seen / total : 0.0;
+  }
+
+  void fill_row(Eigen::Index row, Eigen::MatrixXd& exchange) {
+    const auto i = static_cast<std::size_t>(row);
+    const std::uint32_t pi = mesh_.patches[i].piece;
+    std::size_t unoccluded = 0, hidden = 0, partial = 0, rays = 0;
+    // Column i below the diagonal is contiguous; the upper half is copied afterwards.
+    for (std::size_t j = i + 1; j < mesh_.size(); ++j) {
+      const std::uint32_t pj = mesh_.patches[j].piece;
+      if (pi == pj || !(shapes_[i].sides[pj] & 1) || !(shapes_[j].sides[pi] & 1)) continue;
+      double share = 1.0;
+      const bool sampled = options_.occlusion && may_be_occluded(i, j);
+      if (sampled) {
+        share = visible_share(i, j, rays);
+        if (share == 0.0) {
+          ++hidden;
+          continue;
+        }
+        ++partial;
+        sampled_[i].push_back(static_cast<std::uint32_t>(j));
+      } else {
+        ++unoccluded;
+      }
+      exchange(static_cast<Eigen::Index>(j), row) =
+          share * exchange_area_m2(shapes_[i].polygon, shapes_[j].polygon,
+                                   sampled ? 1e-4 : options_.relative_tolerance);
+    }
+    unoccluded_ += unoccluded;
+    hidden_ += hidden;
+    partial_ += partial;
+    rays_ += rays;
+  }
+
+  // A patch under a block sees nothing: every ray from it meets the back of a surface at once.
+  void mark_buried(FormFactors& factors) const {
+    factors.usable.assign(mesh_.size(), 1);
+    for (std::size_t i = 0; i < mesh_.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      if (factors.exchange_area_m2.col(row).sum() > 1e-4 * factors.area_m2[row]) continue;
+      const Vec3& normal = mesh_.plane_of(mesh_.patches[i]).normal;
+      const auto hit = visibility_.first_hit(
+          mesh_.patches[i].centroid + visibility_.offset_m() * normal, normal, true);
+      if (!hit || hit->front) continue;
+      factors.usable[i] = 0;
+      ++factors.summary.buried_patches;
+      factors.exchange_area_m2.col(row).setZero();
+      factors.exchange_area_m2.row(row).setZero();
+    }
+  }
+
+  // Cosine-distributed rays from every element: closed if none escapes.
+  void test_closure(FormFactors& factors) const {
+    std::size_t escaped = 0, cast = 0;
+    for (std::size_t i = 0; i < mesh_.size(); ++i) {
+      const Patch& patch = mesh_.patches[i];
+      if (!factors.usable[i] || scene_.surfaces[mesh_.surface_of(patch)].is_opening) continue;
+      const Vec3& n = mesh_.plane_of(patch).normal;
+      const Vec3 t = n.unitOrthogonal(), b = n.cross(t);
+      std::uint64_t state = hash(options_.seed + 77 + i);
+      const auto random = [&state] {
+        state = hash(state);
+        return unit_interval(state);
+      };
+      for (int k = 0; k < 16; ++k, ++cast) {
+        const double r2 = random(), phi = 2.0 * std::numbers::pi * random();
+        const Vec3 direction = std::sqrt(r2) * (std::cos(phi) * t + std::sin(phi) * b) +
+                               std::sqrt(1.0 - r2) * n;
+        const double u = random(), v = random();
+        const Vec3 origin = sample_polygon(shapes_[i].polygon.vertices, u, v);
+        if (!visibility_.first_hit(origin + visibility_.offset_m() * n, direction, true)) ++escaped;
+      }
+    }
+    factors.summary.closure_rays = cast;
+    factors.summary.closed = cast > 0 && escaped == 0;
+  }
+
+  // Scales only sampled entries, S_ij <- x_i x_j S_ij, until each row sums to its area.
+  void repair(FormFactors& factors) const {
+    const Eigen::Index n = factors.size();
+    Eigen::VectorXd exact(n), noisy = Eigen::VectorXd::Zero(n), x = Eigen::VectorXd::Ones(n);
+    for (Eigen::Index i = 0; i < n; ++i) exact[i] = factors.exchange_area_m2.col(i).sum();
+    const auto for_each_sampled = [&](const auto& visit) {
+      for (std::size_t i = 0; i < sampled_.size(); ++i)
+        for (std::uint32_t j : sampled_[i])
+          visit(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    };
+    record_closure(factors, exact);
+    for_each_sampled([&](auto i, auto j) {
+      exact[i] -= factors.exchange_area_m2(j, i);
+      exact[j] -= factors.exchange_area_m2(j, i);
+    });
+    for (int sweep = 0; sweep < 50; ++sweep) {
+      noisy.setZero();
+      for_each_sampled([&](auto i, auto j) {
+        noisy[i] += factors.exchange_area_m2(j, i) * x[j];
+        noisy[j] += factors.exchange_area_m2(j, i) * x[i];
+      });
+      double change = 0.0;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        // Rows whose sampled share is tiny cannot be mended through it.
+        if (!factors.usable[i] || noisy[i] < 1e-3 * factors.area_m2[i]) continue;
+        const double wanted =
+            std::clamp((factors.area_m2[i] - exact[i]) / noisy[i], 0.5, 2.0);
+        const double next = std::sqrt(x[i] * wanted);
+        change = std::max(change, std::abs(next - x[i]));
+        x[i] = next;
+      }
+      if (change < 1e-12) break;
+    }
+    for_each_sampled([&](auto i, auto j) {
+      factors.summary.repair_max = std::max(factors.summary.repair_max, std::abs(x[i] * x[j] - 1.0));
+      factors.exchange_area_m2(j, i) *= x[i] * x[j];
+      factors.exchange_area_m2(i, j) = factors.exchange_area_m2(j, i);
+    });
+    for (Eigen::Index i = 0; i < n; ++i)
+      if (factors.usable[i])
+        factors.summary.closure_residual_max =
+            std::max(factors.summary.closure_residual_max,
+                     std::abs(factors.exchange_area_m2.col(i).sum() / factors.area_m2[i] - 1.0));
+  }
+
+  static void record_closure(FormFactors& factors, const Eigen::VectorXd& row_sums) {
+    double weighted = 0.0, area = 0.0;
+    for (Eigen::Index i = 0; i < factors.size(); ++i) {
+      if (!factors.usable[i]) continue;
+      const double error = std::abs(row_sums[i] / factors.area_m2[i] - 1.0);
+      factors.summary.closure_error_max = std::max(factors.summary.closure_error_max, error);
+      weighted += error * factors.area_m2[i];
+      area += factors.area_m2[i];
+    }
+    factors.summary.closure_error_mean = weighted / area;
+  }
+
+  const PatchMesh& mesh_;
+  const Scene& scene_;
+  const Visibility& visibility_;
+  const FormFactorOptions& options_;
+  double tolerance_m_ = 0.0;
+  std::vector<PatchShape> shapes_;
+  std::vector<std::uint32_t> blockers_;
+  std::vector<Eigen::AlignedBox3d> boxes_;
+  std::vector<Sides> piece_sides_;
+  std::vector<std::vector<std::uint32_t>> sampled_;  // pairs i < j whose share came from rays
+  std::atomic<std::size_t> unoccluded_{0}, hidden_{0}, partial_{0}, rays_{0};
+};
+
+}  // namespace
+
+FormFactors form_factors(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+                         const FormFactorOptions& options) {
+  const std::size_t bytes = mesh.size() * mesh.size() * sizeof(double);
+  if (bytes > options.memory_limit_bytes)
+    throw std::length_error(
+        std::to_string(mesh.size()) + " elements need " + std::to_string(bytes >> 20) +
+        " MiB of form factors, the limit is " + std::to_string(options.memory_limit_bytes >> 20) +
+        " MiB; that fits " +
+        std::to_string(static_cast<std::size_t>(
+            std::sqrt(static_cast<double>(options.memory_limit_bytes) / sizeof(double)))) +
+        " elements");
+  return Builder(mesh, scene, visibility, options).build();
+}
+
+}  // namespace truebox

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "mesh/patch_mesh.h"
+#include "mesh/smooth_field.h"
+#include "transport/visibility.h"
+
+namespace truebox {
+
+/// Told the share done, in [0, 1]; may be called from any thread, one at a time.
+using Progress = std::function<void(const std::string& stage, double share)>;
+
+struct FormFactorOptions {
+  double relative_tolerance = 1e-5;  ///< of the unoccluded kernel, each pair
+  bool occlusion = true;             ///< false where the scene cannot block (see Requirements)
+  int rays = 16;  ///< of a pair that something may stand between; at least 4, not a multiple of 7
+  std::uint64_t seed = 1;
+  std::size_t memory_limit_bytes = std::size_t{8} << 30;
+  Progress progress;
+};
+
+/// How the factors were found and how well they close.
+struct FormFactorSummary {
+  std::size_t pairs_unoccluded = 0, pairs_hidden = 0, pairs_sampled = 0;
+  std::size_t rays = 0;
+  std::size_t buried_patches = 0;   ///< lie under another surface and see nothing
+  bool closed = false;              ///< no ray of the closure test escaped
+  std::size_t closure_rays = 0;
+  double closure_error_max = 0.0;   ///< max |sum_j F_ij - 1| before repair (closed scenes)
+  double closure_error_mean = 0.0;  ///< its area-weighted mean
+  double repair_max = 0.0;          ///< largest relative change of a sampled factor
+  double closure_residual_max = 0.0;  ///< max |sum_j F_ij - 1| after repair
+  double row_sum_max = 0.0;         ///< max sum_j F_ij as used
+};
+
+/// All pairs of a mesh as one symmetric matrix of exchange areas S_ij = A_i F_ij (m^2), n x n, so
+/// that reciprocity holds by construction.
+struct FormFactors {
+  Eigen::MatrixXd exchange_area_m2;
+  Eigen::VectorXd area_m2;
+  std::vector<char> usable;  ///< 0: buried
+  FormFactorSummary summary;
+
+  Eigen::Index size() const { return area_m2.size(); }
+};
+
+/// Analytic kernel times visible share. Pairs that no surface can come between (half-space and box
+/// tests) take the kernel alone; the others are sampled by quasi-random ray pairs weighted with the
+/// kernel. If the scene is closed, only sampled factors are scaled, symmetrically, until rows sum
+/// to 1 (Sinkhorn); the summary says by how much.
+/// Sources: Sinkhorn & Knopp (1967); low-discrepancy recurrence: Roberts (2018).
+/// Throws std::length_error with the sizes if n^2 doubles exceed the memory limit.
+FormFactors form_factors(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+                         const FormFactorOptions& options);
+
+}  // namespace truebox

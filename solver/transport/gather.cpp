@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "transport/gather.h"
+
+#include <algorithm>
+
+#include "transport/form_factor.h"
+#include "transport/quadrature.h"
+
+namespace truebox {
+namespace {
+
+bool any_beyond(std::span<const Vec3> polygon, const Plane& plane, double sign, double tolerance_m) {
+  return std::any_of(polygon.begin(), polygon.end(), [&](const Vec3& v) {
+    return sign * plane.distance_m(v) > tolerance_m;
+  });
+}
+
+Eigen::Map<const Eigen::VectorXd> as_vector(const std::vector<double>& values) {
+  return {values.data(), static_cast<Eigen::Index>(values.size())};
+}
+
+// Calls visit(point, weight) for a 4 x 4 Gauss rule on a convex polygon; weights sum to 1.
+template <class Visit>
+void for_each_gauss_point(const Polygon& polygon, const Visit& visit) {
+  constexpr int kPoints = 4;
+  const GaussRule& rule = gauss_rule(kPoints);
+  const Vec3 area = area_vector(polygon);
+  const Vec3 normal = area.normalized();
+  const bool quad = polygon.size() == 4;
+  for (std::size_t k = 2; k < (quad ? 3 : polygon.size()); ++k) {
+    const Vec3 &a = polygon[0], &b = polygon[k - 1], &c = polygon[k], &d = quad ? polygon[3] : a;
+    for (int j = 0; j < kPoints; ++j)
+      for (int i = 0; i < kPoints; ++i) {
+        const double u = rule.nodes[i], v = rule.nodes[j];
+        const Vec3 du = (1 - v) * (b - a) + v * (c - d), dv = (1 - u) * (d - a) + u * (c - b);
+        visit(Vec3((1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * d + u * c)),
+              rule.weights[i] * rule.weights[j] * normal.dot(du.cross(dv)) / area.norm());
+      }
+  }
+}
+
+}  // namespace
+
+Gather::Gather(const PatchMesh& mesh, const Scene& scene, bool occlusion)
+    : mesh_(mesh), scene_(scene), tolerance_m_(1e-9 * scene.diameter_m()) {
+  for (std::uint32_t p = 0; p < mesh.pieces.size(); ++p) {
+    const Surface& surface = scene.surfaces[mesh.pieces[p].surface];
+    if (surface.is_opening) continue;
+    if (scene.material_of(surface).emits()) luminous_pieces_.push_back(p);
+    // A piece with the whole scene on one side cannot stand between two points of it.
+    bool front = false, behind = false;
+    for (const Piece& other : mesh.pieces) {
+      front |= any_beyond(other.polygon, mesh.pieces[p].plane, 1.0, tolerance_m_);
+      behind |= any_beyond(other.polygon, mesh.pieces[p].plane, -1.0, tolerance_m_);
+    }
+    if (!occlusion || !front || !behind) continue;
+    blockers_.push_back({mesh.pieces[p].polygon, mesh.pieces[p].plane});
+    blocker_piece_.push_back(p);
+  }
+}
+
+double Gather::visible_factor(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon,
+                              std::uint32_t piece, Scratch& scratch) const {
+  const Plane& plane = mesh_.pieces[piece].plane;
+  if (plane.distance_m(point) <= tolerance_m_) return 0.0;  // sees its back or its edge
+  const Plane horizon{normal, normal.dot(point)};
+  if (!any_beyond(polygon, horizon, 1.0, tolerance_m_)) return 0.0;
+  scratch.blockers.clear();
+  for (std::size_t b = 0; b < blockers_.size(); ++b)
+    if (blocker_piece_[b] != piece &&
+        may_block(blockers_[b], point, polygon, plane, tolerance_m_) &&
+        any_beyond(blockers_[b].polygon, horizon, 1.0, tolerance_m_))
+      scratch.blockers.push_back(&blockers_[b]);
+  if (scratch.blockers.empty()) return point_to_polygon(point, normal, polygon);
+  clip(polygon, horizon, 1e-13 * (polygon[0] - point).norm(), scratch.polygon);
+  if (scratch.polygon.empty()) return 0.0;
+  double factor = 0.0;
+  for (const Polygon& part : scratch.parts(point, scratch.polygon, plane, scratch.blockers))
+    factor += point_to_polygon(point, normal, part);
+  return factor;
+}
+
+void Gather::add_direct(const Vec3& point, const Vec3& normal,
+                        Eigen::Ref<Eigen::VectorXd> irradiance, Scratch& scratch) const {
+  for (std::uint32_t p : luminous_pieces_) {
+    const Piece& piece = mesh_.pieces[p];
+    const double factor = visible_factor(point, normal, piece.polygon, p, scratch);
+    if (factor > 0.0)
+      irradiance +=
+          factor * as_vector(scene_.material_of(scene_.surfaces[piece.surface]).exitance.values);
+  }
+}
+
+bool Gather::may_come_between(const Blocker& blocker, std::span<const Vec3> a, const Plane& plane_a,
+                              std::span<const Vec3> b, const Plane& plane_b) const {
+  const auto beyond = [&](std::span<const Vec3> polygon, double sign) {
+    return any_beyond(polygon, blocker.plane, sign, tolerance_m_);
+  };
+  if (!(beyond(a, 1.0) || beyond(b, 1.0)) || !(beyond(a, -1.0) || beyond(b, -1.0))) return false;
+  return any_beyond(blocker.polygon, plane_a, 1.0, tolerance_m_) &&
+         any_beyond(blocker.polygon, plane_b, 1.0, tolerance_m_);
+}
+
+void Gather::add_mean_direct(std::uint32_t patch_index, Eigen::Ref<Eigen::VectorXd> irradiance,
+                             Scratch& scratch) const {
+  const Patch& patch = mesh_.patches[patch_index];
+  const Plane& plane = mesh_.plane_of(patch);
+  Polygon polygon;
+  mesh_.polygon_of(patch, polygon);
+  for (std::uint32_t p : luminous_pieces_) {
+    const Piece& piece = mesh_.pieces[p];
+    if (p == patch.piece || !any_beyond(piece.polygon, plane, 1.0, tolerance_m_) ||
+        !any_beyond(polygon, piece.plane, 1.0, tolerance_m_))
+      continue;
+    bool blocked = false;
+    for (std::size_t b = 0; b < blockers_.size() && !blocked; ++b)
+      blocked = blocker_piece_[b] != p && blocker_piece_[b] != patch.piece &&
+                may_come_between(blockers_[b], polygon, plane, piece.polygon, piece.plane);
+    double factor = 0.0;
+    if (!blocked) {
+      factor = exchange_area_m2(PlanarPolygon(polygon), PlanarPolygon(piece.polygon), 1e-12) /
+               patch.area_m2;
+    } else {
+      for_each_gauss_point(polygon, [&](const Vec3& point, double weight) {
+        factor += weight * visible_factor(point, plane.normal, piece.polygon, p, scratch);
+      });
+    }
+    irradiance +=
+        factor * as_vector(scene_.material_of(scene_.surfaces[piece.surface]).exitance.values);
+  }
+}
+
+namespace {
+
+// Four parts of a triangle or quad, a fan of triangles of anything else.
+std::vector<Polygon> split(const Polygon& p) {
+  std::vector<Polygon> parts;
+  const std::size_t n = p.size();
+  if (n == 3 || n == 4) {
+    Polygon middle(n);
+    for (std::size_t i = 0; i < n; ++i) middle[i] = 0.5 * (p[i] + p[(i + 1) % n]);
+    if (n == 3) {
+      parts.push_back(middle);
+      for (std::size_t i = 0; i < n; ++i) parts.push_back({middle[(i + 2) % n], p[i], middle[i]});
+    } else {
+      const Vec3 centre = 0.25 * (p[0] + p[1] + p[2] + p[3]);
+      for (std::size_t i = 0; i < n; ++i)
+        parts.push_back({middle[(i + 3) % n], p[i], middle[i], centre});
+    }
+  } else {
+    for (std::size_t i = 2; i < n; ++i) parts.push_back({p[0], p[i - 1], p[i]});
+  }
+  return parts;
+}
+
+constexpr int kDeepestSplit = 12;  // 2^-12 of an element: nearer points see rounding anyway
+
+}  // namespace
+
+void Gather::add_near_field(const Vec3& point, const Vec3& normal, const Polygon& polygon,
+                            std::uint32_t patch, int depth, const SourceAt& source_at,
+                            Scratch& scratch, Eigen::Ref<Eigen::RowVectorXd> sum) const {
+  const Vec3 centre = centroid(polygon);
+  if (diameter_m(polygon) > kNearField * (centre - point).norm() && depth < kDeepestSplit) {
+    for (const Polygon& part : split(polygon))
+      add_near_field(point, normal, part, patch, depth + 1, source_at, scratch, sum);
+    return;
+  }
+  const double factor =
+      visible_factor(point, normal, polygon, mesh_.patches[patch].piece, scratch);
+  if (factor <= 0.0) return;
+  Eigen::VectorXd value(sum.size());
+  source_at(patch, centre, depth, value);
+  sum += factor * value.transpose();
+}
+
+BandMatrix Gather::from_surfaces(const Vec3& point, const Vec3& normal, const BandMatrix& radiosity,
+                                 const SourceAt& source_at, Scratch& scratch) const {
+  BandMatrix sum =
+      BandMatrix::Zero(static_cast<Eigen::Index>(scene_.surfaces.size()), radiosity.cols());
+  const Plane horizon{normal, normal.dot(point)};
+  Polygon polygon;
+  Eigen::RowVectorXd near(radiosity.cols());
+  for (std::uint32_t p = 0; p < mesh_.pieces.size(); ++p) {
+    const Piece& piece = mesh_.pieces[p];
+    if (piece.plane.distance_m(point) <= tolerance_m_ ||
+        !any_beyond(piece.polygon, horizon, 1.0, tolerance_m_))
+      continue;
+    auto row = sum.row(static_cast<Eigen::Index>(piece.surface));
+    for (std::uint32_t j = piece.first_patch; j < piece.first_patch + piece.patch_count; ++j) {
+      mesh_.polygon_of(mesh_.patches[j], polygon);
+      if (diameter_m(polygon) > kNearField * (mesh_.patches[j].centroid - point).norm()) {
+        near.setZero();
+        add_near_field(point, normal, polygon, j, 0, source_at, scratch, near);
+        row += near;
+        continue;
+      }
+      const double factor = visible_factor(point, normal, polygon, p, scratch);
+      if (factor > 0.0) row += factor * radiosity.row(j);
+    }
+  }
+  return sum;
+}
+
+}  // namespace truebox

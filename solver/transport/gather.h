@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "mesh/patch_mesh.h"
+#include "mesh/smooth_field.h"
+#include "transport/visible_parts.h"
+
+namespace truebox {
+
+/// Irradiance gathered at a point by exact visibility: each source polygon is clipped by the
+/// shadows of its blockers, then Lambert's formula; no sampling, no noise.
+class Gather {
+ public:
+  /// Working memory, one a thread.
+  struct Scratch {
+    VisibleParts parts;
+    Polygon polygon;
+    std::vector<const Blocker*> blockers;
+  };
+
+  Gather(const PatchMesh& mesh, const Scene& scene, bool occlusion);
+
+  /// Visible view factor from a surface element to a convex polygon on `piece`, in [0, 1].
+  double visible_factor(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon,
+                        std::uint32_t piece, Scratch& scratch) const;
+
+  /// Adds the direct irradiance of all luminaires, W m^-2 nm^-1, one value a band of the scene.
+  void add_direct(const Vec3& point, const Vec3& normal, Eigen::Ref<Eigen::VectorXd> irradiance,
+                  Scratch& scratch) const;
+
+  /// Mean direct irradiance of an element: closed form where nothing can stand between, otherwise
+  /// 4 x 4 Gauss points of exact visibility.
+  void add_mean_direct(std::uint32_t patch, Eigen::Ref<Eigen::VectorXd> irradiance,
+                       Scratch& scratch) const;
+
+  /// Radiosity (one value a band) that leaves a point of an element; `depth` says how often the
+  /// element was split to get there.
+  using SourceAt = std::function<void(std::uint32_t patch, const Vec3& point, int depth,
+                                      Eigen::Ref<Eigen::VectorXd> value)>;
+
+  /// Irradiance at a point from each surface, surfaces x bands. Far elements send their mean
+  /// `radiosity` (elements x bands); an element longer than kNearField of its distance is split
+  /// until it is short, and its parts send what `source_at` says of their centroids.
+  BandMatrix from_surfaces(const Vec3& point, const Vec3& normal, const BandMatrix& radiosity,
+                           const SourceAt& source_at, Scratch& scratch) const;
+
+  static constexpr double kNearField = 0.5;
+
+ private:
+  void add_near_field(const Vec3& point, const Vec3& normal, const Polygon& polygon,
+                      std::uint32_t patch, int depth, const SourceAt& source_at, Scratch& scratch,
+                      Eigen::Ref<Eigen::RowVectorXd> sum) const;
+  bool may_come_between(const Blocker& blocker, std::span<const Vec3> a, const Plane& plane_a,
+                        std::span<const Vec3> b, const Plane& plane_b) const;
+
+  const PatchMesh& mesh_;
+  const Scene& scene_;
+  std::vector<Blocker> blockers_;
+  std::vector<std::uint32_t> blocker_piece_;
+  std::vector<std::uint32_t> luminous_pieces_;
+  double tolerance_m_ = 0.0;
+};
+
+}  // namespace truebox

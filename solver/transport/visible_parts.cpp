@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "transport/visible_parts.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace truebox {
+namespace {
+constexpr double kTolerance = 1e-12;  // of the lengths at hand: rounding of a few operations
+}
+
+bool may_block(const Blocker& blocker, const Vec3& point, std::span<const Vec3> source,
+               const Plane& source_plane, double tolerance_m) {
+  const double side = blocker.plane.distance_m(point);
+  if (std::abs(side) <= tolerance_m) return false;  // seen edge-on
+  bool beyond = false;
+  for (const Vec3& v : source)
+    beyond |= (side > 0.0 ? blocker.plane.distance_m(v) : -blocker.plane.distance_m(v)) < -tolerance_m;
+  if (!beyond) return false;
+  return std::any_of(blocker.polygon.begin(), blocker.polygon.end(), [&](const Vec3& v) {
+    return source_plane.distance_m(v) > tolerance_m;
+  });
+}
+
+void VisibleParts::remove_shadow(const Vec3& point, const Blocker& blocker) {
+  rest_.clear();
+  const double side = blocker.plane.distance_m(point) > 0.0 ? 1.0 : -1.0;
+  const std::size_t n = blocker.polygon.size();
+  for (Polygon& part : parts_) {
+    current_.swap(part);
+    for (std::size_t i = 0; i < n && !current_.empty(); ++i) {
+      const Vec3 a = blocker.polygon[i] - point, b = blocker.polygon[(i + 1) % n] - point;
+      const Vec3 outward = side * a.cross(b);
+      const double length = outward.norm();
+      if (length == 0.0) continue;
+      const Plane edge{outward / length, outward.dot(point) / length};
+      const double tolerance = kTolerance * (current_[0] - point).norm();
+      clip(current_, edge, tolerance, outside_);
+      if (!outside_.empty()) rest_.push_back(outside_);
+      clip(current_, Plane{-edge.normal, -edge.offset_m}, tolerance, inside_);
+      current_.swap(inside_);
+    }
+    if (current_.empty()) continue;
+    const Plane near{side * blocker.plane.normal, side * blocker.plane.offset_m};
+    clip(current_, near, kTolerance * (current_[0] - point).norm(), outside_);
+    if (!outside_.empty()) rest_.push_back(outside_);
+  }
+  parts_.swap(rest_);
+}
+
+std::span<const Polygon> VisibleParts::operator()(const Vec3& point, std::span<const Vec3> source,
+                                                  const Plane& source_plane,
+                                                  std::span<const Blocker* const> blockers) {
+  parts_.clear();
+  parts_.emplace_back(source.begin(), source.end());
+  const double tolerance = kTolerance * (source[0] - point).norm();
+  for (const Blocker* blocker : blockers)
+    if (!parts_.empty() && may_block(*blocker, point, source, source_plane, tolerance))
+      remove_shadow(point, *blocker);
+  return parts_;
+}
+
+}  // namespace truebox
