@@ -125,6 +125,14 @@ DisplayPicture convert(const ocio::CPUProcessor& processor, const std::string& d
     processor.applyRGB(value);
     quantise(value, finite, i, picture);
   }
+  const auto percent = [&](std::size_t n) {
+    return 100.0 * static_cast<double>(n) / static_cast<double>(std::max<std::size_t>(1, pixels));
+  };
+  picture.note = fmt::format("exposure {:.3g} (white = {:.3g}); {:.2g} % clipped, {:.2g} % out of gamut",
+                             exposure, 1.0 / exposure, percent(picture.clipped_pixels),
+                             percent(picture.out_of_gamut_pixels));
+  if (picture.not_finite_pixels > 0)
+    picture.note += fmt::format(", {} pixels not finite (magenta)", picture.not_finite_pixels);
   picture.description = fmt::format(
       "{}, exposure {:.4g} (display white = {:.4g}), {} of {} pixels clipped, {} out of gamut, "
       "{} not finite",

@@ -20,8 +20,8 @@ struct DisplayPicture {
   std::size_t out_of_gamut_pixels = 0; ///< negative in R, G or B: the display has no such colour
   std::size_t not_finite_pixels = 0;   ///< NaN or Inf, drawn magenta
   double exposure = 1.0;
-  /// Config, spaces, display, view, white, exposure and the counts above, for the report.
-  std::string description;
+  std::string description;  ///< config, spaces, display, view, white, exposure and the counts above
+  std::string note;         ///< the exposure and what was clipped, short enough for a caption
 };
 
 /// From scene-linear BT.709 (D65) to what a display shows: v = display(exposure * L).

@@ -28,17 +28,17 @@ struct Check {
   Agreement outcome = Agreement::not_run;
   double measured = 0.0;
   double limit = 0.0;
-  std::string unit;
-  std::string message;  ///< what the number means, or what to do about it
+  std::string unit{};
+  std::string message{};  ///< what the number means, or what to do about it
 };
 
 /// A number for the row below the verdict.
 struct KeyNumber {
   std::string label;
   double value = 0.0;
-  std::string unit;
+  std::string unit{};
   int digits = 3;    ///< significant
-  std::string note;  ///< a few words: "limit 1", "k = 2"
+  std::string note{};  ///< a few words: "limit 1", "k = 2"
 };
 
 struct Paragraph {
@@ -47,7 +47,7 @@ struct Paragraph {
 
 struct Column {
   std::string name;
-  std::string unit;
+  std::string unit{};
   int digits = 4;      ///< significant, or decimals where `fixed`
   bool fixed = false;  ///< a fixed number of decimals, so that the column lines up
 };
@@ -69,7 +69,7 @@ struct Cell {
 };
 
 struct Table {
-  std::string caption;
+  std::string caption{};
   std::vector<Column> columns;
   std::vector<std::vector<Cell>> rows;  ///< as many cells as columns
 };
@@ -78,20 +78,20 @@ struct Table {
 struct Figure {
   std::string title;
   std::string svg;
-  std::string caption;
+  std::string caption{};
 };
 
 /// One of several pictures shown side by side. `alt` says in words what the picture shows.
 struct Panel {
   std::string title;  ///< "Photograph", "Prediction", "Signed difference"
   Picture picture;
-  std::string alt;
+  std::string alt{};
 };
 
 /// Pictures of the same pixels; a reader can flip between them in place.
 struct PictureRow {
   std::vector<Panel> panels;
-  std::string caption;
+  std::string caption{};
 };
 
 using Block = std::variant<Paragraph, Table, Figure, PictureRow>;
@@ -109,7 +109,7 @@ struct Setting {
 
 struct Report {
   std::string title;
-  std::string subtitle;  ///< one line: what was compared with what; says so if data is simulated
+  std::string subtitle{};  ///< one line: what was compared with what; says so if data is simulated
   Verdict verdict;
   std::vector<KeyNumber> key_numbers;
   std::vector<Section> sections;

@@ -84,8 +84,8 @@ std::string to_markdown(const Report& report) {
   if (!report.subtitle.empty()) md += "\n" + markdown_text(report.subtitle) + "\n";
   if (!report.key_numbers.empty()) md += "\n";
   for (const auto& n : report.key_numbers)
-    md += fmt::format("- {}: {} {}{}\n", markdown_text(n.label), number_text(n.value, n.digits),
-                      markdown_text(unit_text(n.unit)),
+    md += fmt::format("- {}: {}{}{}\n", markdown_text(n.label), number_text(n.value, n.digits),
+                      n.unit.empty() || n.unit == "1" ? "" : " " + markdown_text(unit_text(n.unit)),
                       n.note.empty() ? "" : " (" + markdown_text(n.note) + ")");
   if (report.checks.empty()) return md;
   std::vector<const Check*> sorted;

@@ -18,6 +18,14 @@ double tick_step(double span) {
   return decade;
 }
 
+/// 10⁻⁴ also where a plain number would do, so that one axis has one form.
+std::string power_text(double tick) {
+  const double exponent = std::floor(std::log10(tick) + 1e-9);
+  const auto mantissa = std::lround(tick / std::pow(10.0, exponent));  // 1, 2 or 5
+  const std::string power = unit_text("10^" + std::to_string(static_cast<int>(exponent)));
+  return mantissa == 1 ? power : std::to_string(mantissa) + " × " + power;
+}
+
 }  // namespace
 
 AxisScale::AxisScale(ValueRange range, bool logarithmic, double from_paper, double to_paper)
@@ -70,7 +78,8 @@ bool AxisScale::shows(double value) const {
 
 std::string AxisScale::tick_label(double tick) const {
   const double largest = std::max(std::abs(range_.low), std::abs(range_.high));
-  if (logarithmic_) return number_text(tick, 1);
+  if (logarithmic_ && range_.low > 0.99e-3 && range_.high < 1.01e4) return number_text(tick, 1);
+  if (logarithmic_) return power_text(tick);
   if (largest >= 1e6 || decimals_ > 5) return number_text(tick, 3);
   return fixed_text(tick, decimals_);
 }

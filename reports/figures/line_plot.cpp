@@ -14,9 +14,9 @@
 namespace truebox {
 namespace {
 
-// 480 units wide with 13 unit text: 10 px on a phone, 15 px in a column of a wide page.
-constexpr double kWidth = 480, kPlotTop = 28, kPlotBottom = 270, kLeft = 64, kRight = 466;
-constexpr double kLegendTop = 328, kLegendRow = 20, kCharacter = 7.2;
+// 480 units wide with 14 unit text: 10 px on a phone, 16 px in a column of a wide page.
+constexpr double kWidth = 480, kPlotTop = 28, kPlotBottom = 270, kLeft = 64, kRight = 458;
+constexpr double kLegendTop = 328, kLegendRow = 20, kCharacter = 7.8;
 constexpr std::array kColours = {"#0072b2", "#d55e00", "#008a66", "#a4509a", "#9a7400", "#2a9fd6"};
 
 std::string colour(std::size_t series) {
@@ -163,7 +163,7 @@ std::string to_svg(const LinePlot& plot) {
   const auto [legend_svg, rows] = legend(plot);
   std::string svg = fmt::format(
       "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" role=\"img\" "
-      "font-size=\"13\" fill=\"currentColor\"><title>{}</title>",
+      "font-size=\"14\" fill=\"currentColor\"><title>{}</title>",
       kWidth, kLegendTop + rows * kLegendRow - 8, xml_escape(plot.title));
   svg += axes(plot, x, y);
   for (std::size_t i = 0; i < plot.series.size(); ++i) svg += draw(plot.series[i], i, x, y);

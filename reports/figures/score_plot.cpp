@@ -22,7 +22,7 @@ constexpr const char* kCurve = "var(--series-1,#d55e00)";
 std::string open(const std::string& title, double height) {
   return fmt::format(
       "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" role=\"img\" "
-      "font-size=\"13\" fill=\"currentColor\"><title>{}</title>",
+      "font-size=\"14\" fill=\"currentColor\"><title>{}</title>",
       kWidth, height, xml_escape(title));
 }
 

@@ -102,7 +102,9 @@ std::string number_text(double value, int digits) {
 
 std::string fixed_text(double value, int decimals) {
   if (!std::isfinite(value)) return special_text(value);
-  return fmt::format("{:.{}f}", value, decimals);
+  std::string text = fmt::format("{:.{}f}", value, decimals);
+  if (text.starts_with('-') && text.find_first_of("123456789") == text.npos) text.erase(0, 1);
+  return text;  // a rounded-away "-0.00" would claim a sign that is not known
 }
 
 std::string estimate_text(double value, double standard_uncertainty, int digits) {
