@@ -87,6 +87,7 @@ BandFiles read_band(TomlTable table) {
   band.transmission_path = transmission.existing_file("file");
   band.transmission_column = transmission.text("column");
   transmission.finish();
+  band.note = table.text_or("note", "");
   band.stated_centre_nm = table.number("stated_centre_nm", 1.0, 1e6);
   for (TomlTable& frame : table.tables("photographs")) {
     FrameFile file;

@@ -39,6 +39,7 @@ struct BandFiles {
   std::string transmission_path;    ///< table of the filter's measured transmission
   std::string transmission_column;
   double stated_centre_nm = 0.0;    ///< the maker's
+  std::string note;                 ///< why this site, for the report; may be empty
   std::vector<FrameFile> photographs;
 };
 
