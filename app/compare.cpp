@@ -79,14 +79,17 @@ std::string place(const SamplePosition& at) {
 std::string verdict_sentence(const Comparison& c) {
   const DifferenceGate& g = c.gate;
   if (g.pixels_not_finite > 0)
-    return fmt::format("{} of {} pixels hold NaN or Inf, so nothing can be said for the test image.",
-                       g.pixels_not_finite, g.pixels);
+    return fmt::format(
+        "{} of {} pixels hold NaN or Inf, so nothing can be said for the test image.",
+        g.pixels_not_finite, g.pixels);
   const std::string unit = scale_unit(c);
-  const std::string largest = fmt::format("the largest {}difference is {} at {}",
-                                          g.limits.scale == DifferenceScale::relative ? "relative " : "",
-                                          with_unit(g.largest, unit), place(g.largest_at));
+  const std::string largest =
+      fmt::format("the largest {}difference is {} at {}",
+                  g.limits.scale == DifferenceScale::relative ? "relative " : "",
+                  with_unit(g.largest, unit), place(g.largest_at));
   if (g.outcome == Agreement::agrees)
-    return fmt::format("The images agree: {}, the limit {}.", largest, with_unit(g.limits.warn, unit));
+    return fmt::format("The images agree: {}, the limit {}.", largest,
+                       with_unit(g.limits.warn, unit));
   const bool fails = g.outcome == Agreement::fails;
   return fmt::format("{} of {} pixels differ by more than {} ({:.3g} % may); {}.",
                      fails ? g.pixels_over_fail : g.pixels_over_warn, g.pixels,
@@ -97,7 +100,9 @@ std::string verdict_sentence(const Comparison& c) {
 Table statistics_table(const Comparison& c) {
   const DifferenceStatistics& s = c.statistics;
   const std::string unit = unit_text(c.map.unit);
-  Table table{"Differences, test - reference, over all finite samples", {{"Statistic"}, {"Value"}, {"Unit"}}, {}};
+  Table table{"Differences, test - reference, over all finite samples",
+              {{"Statistic"}, {"Value"}, {"Unit"}},
+              {}};
   const auto add = [&](const char* name, double value, const std::string& u) {
     table.rows.push_back({name, value, u});
   };
@@ -141,20 +146,28 @@ PictureRow pictures(const Comparison& c, std::string& colour_description) {
   std::vector<float> test = worst.reference;
   for (std::size_t i = 0; i < test.size(); ++i) test[i] += worst.difference[i];
   const double exposure =
-      exposure_for_quantile(colour ? c.reference.find("G")->samples : worst.reference, 0.98);
+      exposure_for_quantile(colour ? c.reference.find("G")->samples : worst.reference, 0.95);
   const DisplayPicture r = shown(pipeline, c.reference, colour, worst.reference, exposure);
   const DisplayPicture t = shown(pipeline, c.test, colour, test, exposure);
   colour_description = r.description;
-  const double limit = symmetric_limit(worst.difference, 0.99);
+  const bool sigmas = c.gate.limits.scale == DifferenceScale::sigmas;
+  std::vector<float> shown_difference = worst.difference;
+  if (sigmas)
+    for (std::size_t i = 0; i < test.size(); ++i)
+      shown_difference[i] = static_cast<float>(worst.sigmas(i));
+  const double limit = symmetric_limit(shown_difference, 0.99);
   const int w = c.map.width, h = c.map.height;
-  return {{{"Reference", plain_picture(w, h, r.rgb, r.note), "The reference image"},
-           {"Test", plain_picture(w, h, t.rgb, t.note), "The test image, with the same exposure"},
-           {"Signed difference",
-            signed_false_colour(w, h, worst.difference, limit, "test - reference, " + worst.name,
-                                c.map.unit),
-            "Difference by pixel: " + verdict_sentence(c)}},
-          "Grey: no difference. Red: the test is brighter. Blue: it is darker. The scale ends at the "
-          "99th percentile of the channel with the largest difference."};
+  return {
+      {{"Reference", plain_picture(w, h, r.rgb, r.note), "The reference image"},
+       {"Test", plain_picture(w, h, t.rgb, t.note), "The test image, with the same exposure"},
+       {"Signed difference",
+        signed_false_colour(
+            w, h, shown_difference, limit,
+            (sigmas ? "(test - reference) / u, " : "test - reference, ") + worst.name,
+            sigmas ? "1" : c.map.unit),
+        "Difference by pixel: " + verdict_sentence(c)}},
+      "Grey: no difference. Red: the test is brighter. Blue: it is darker. The scale ends at the "
+      "99th percentile of the channel with the largest difference."};
 }
 
 Figure z_figure(const Comparison& c) {
@@ -192,8 +205,10 @@ Report make_report(const CompareArguments& a, const Comparison& c) {
   report.sections = {{"Pictures", {pictures(c, colour)}}, {"Numbers", {statistics_table(c)}}};
   if (c.map.has_uncertainty()) report.sections[1].blocks.push_back(z_figure(c));
   const std::string unit = scale_unit(c);
-  report.provenance = {{"Test", a.test}, {"Reference", a.reference},
-                       {"Warn limit", with_unit(a.warn, unit)}, {"Fail limit", with_unit(a.fail, unit)},
+  report.provenance = {{"Test", a.test},
+                       {"Reference", a.reference},
+                       {"Warn limit", with_unit(a.warn, unit)},
+                       {"Fail limit", with_unit(a.fail, unit)},
                        {"Pixels allowed beyond", fmt::format("{:g} %", 100.0 * a.outliers)},
                        {"Colour", colour}};
   return report;
@@ -226,21 +241,29 @@ int run_compare(CompareArguments a) {
 void add_compare_command(CLI::App& program, Action& chosen) {
   auto a = std::make_shared<CompareArguments>();
   CLI::App* command = program.add_subcommand(
-      "compare", "Compares two images (EXR, PNG, TIFF; spectral or RGB) and says whether they agree");
+      "compare",
+      "Compares two images (EXR, PNG, TIFF; spectral or RGB) and says whether they agree");
   command->add_option("TEST", a->test, "the image to be judged")->required();
   command->add_option("REFERENCE", a->reference, "the image to judge it by")->required();
   command->add_option("-o,--output", a->directory, "folder for the report and difference.exr");
-  auto* warn = command->add_option("--warn", a->warn, "warn where a pixel differs by more (default: as --fail)")
+  auto* warn =
+      command
+          ->add_option("--warn", a->warn, "warn where a pixel differs by more (default: as --fail)")
+          ->check(CLI::NonNegativeNumber);
+  auto* fail = command
+                   ->add_option("--fail", a->fail,
+                                "fail where a pixel differs by more (default: as --warn, else 0)")
                    ->check(CLI::NonNegativeNumber);
-  auto* fail = command->add_option("--fail", a->fail, "fail where a pixel differs by more (default: as --warn, else 0)")
-                   ->check(CLI::NonNegativeNumber);
-  auto* relative = command->add_flag("--relative", a->relative, "limits are fractions of the reference");
+  auto* relative =
+      command->add_flag("--relative", a->relative, "limits are fractions of the reference");
   auto* sigmas = command->add_flag("--sigmas", a->sigmas, "limits are in standard uncertainties");
   sigmas->excludes(relative);
-  command->add_option("--uncertainty", a->test_uncertainty, "standard uncertainty of TEST, an image");
+  command->add_option("--uncertainty", a->test_uncertainty,
+                      "standard uncertainty of TEST, an image");
   command->add_option("--reference-stderr", a->reference_uncertainty,
                       "standard uncertainty of REFERENCE, an image");
-  command->add_option("--outliers", a->outliers, "fraction of the pixels that may lie beyond a limit")
+  command
+      ->add_option("--outliers", a->outliers, "fraction of the pixels that may lie beyond a limit")
       ->check(CLI::Range(0.0, 1.0));
   command->add_option("--band", a->band_nm, "compare only the band nearest to this wavelength, nm");
   command->add_option("--json", a->json, "file for the full report as JSON");

@@ -38,13 +38,14 @@ int run_report(const ReportArguments& arguments) {
 
 void add_report_command(CLI::App& program, Action& chosen) {
   auto arguments = std::make_shared<ReportArguments>();
-  CLI::App* command =
-      program.add_subcommand("report", "Writes a report again, as one offline HTML file, from its JSON");
+  CLI::App* command = program.add_subcommand(
+      "report", "Writes a report again, as one offline HTML file, from its JSON");
   command->add_option("RUN", arguments->run, "report.json of an earlier run")->required();
   command->add_option("-o,--output", arguments->output, "the HTML file to write")
       ->capture_default_str();
   command->footer("Example:\n  truebox report out/report.json -o out/report.html");
-  command->callback([arguments, &chosen] { chosen = [arguments] { return run_report(*arguments); }; });
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return run_report(*arguments); }; });
 }
 
 }  // namespace truebox::app

@@ -128,9 +128,9 @@ DisplayPicture convert(const ocio::CPUProcessor& processor, const std::string& d
   const auto percent = [&](std::size_t n) {
     return 100.0 * static_cast<double>(n) / static_cast<double>(std::max<std::size_t>(1, pixels));
   };
-  picture.note = fmt::format("exposure {:.3g} (white = {:.3g}); {:.2g} % clipped, {:.2g} % out of gamut",
-                             exposure, 1.0 / exposure, percent(picture.clipped_pixels),
-                             percent(picture.out_of_gamut_pixels));
+  picture.note = fmt::format(
+      "exposure {:.3g} (white = {:.3g}); {:.2g} % clipped, {:.2g} % out of gamut", exposure,
+      1.0 / exposure, percent(picture.clipped_pixels), percent(picture.out_of_gamut_pixels));
   if (picture.not_finite_pixels > 0)
     picture.note += fmt::format(", {} pixels not finite (magenta)", picture.not_finite_pixels);
   picture.description = fmt::format(
@@ -149,7 +149,8 @@ DisplayPicture ColourPipeline::picture(const Image& image, double exposure) cons
   for (int c = 0; c < 3; ++c) {
     const Channel* channel = image.find(names[c]);
     if (channel == nullptr)
-      throw MismatchError(fmt::format("a colour picture needs R, G and B; {} is missing", names[c]));
+      throw MismatchError(
+          fmt::format("a colour picture needs R, G and B; {} is missing", names[c]));
     planes[c] = channel->samples;
   }
   return convert(*state_->processor, state_->description, image.width, image.height, planes,

@@ -15,10 +15,10 @@ namespace truebox {
 struct DisplayPicture {
   int width = 0;
   int height = 0;
-  std::vector<std::uint8_t> rgb;       ///< 3 x width x height, interleaved, from the top left
-  std::size_t clipped_pixels = 0;      ///< brighter than the display's white in R, G or B
-  std::size_t out_of_gamut_pixels = 0; ///< negative in R, G or B: the display has no such colour
-  std::size_t not_finite_pixels = 0;   ///< NaN or Inf, drawn magenta
+  std::vector<std::uint8_t> rgb;        ///< 3 x width x height, interleaved, from the top left
+  std::size_t clipped_pixels = 0;       ///< brighter than the display's white in R, G or B
+  std::size_t out_of_gamut_pixels = 0;  ///< negative in R, G or B: the display has no such colour
+  std::size_t not_finite_pixels = 0;    ///< NaN or Inf, drawn magenta
   double exposure = 1.0;
   std::string description;  ///< config, spaces, display, view, white, exposure and the counts above
   std::string note;         ///< the exposure and what was clipped, short enough for a caption

@@ -18,7 +18,9 @@ struct Pair {
   double wavelength_nm;
 };
 
-std::string size_text(const Image& image) { return fmt::format("{} x {}", image.width, image.height); }
+std::string size_text(const Image& image) {
+  return fmt::format("{} x {}", image.width, image.height);
+}
 
 std::string bands_text(const SpectralChannels& bands) {
   if (bands.indices.empty()) return "no spectral band";
@@ -58,16 +60,16 @@ std::vector<Pair> match_bands(const Image& test, const Image& reference,
                               const DifferenceOptions& options) {
   const SpectralChannels t = spectral_channels(test), r = spectral_channels(reference);
   if (t.indices.size() != r.indices.size())
-    throw MismatchError(fmt::format("the test has {}, the reference has {}", bands_text(t),
-                                    bands_text(r)));
+    throw MismatchError(
+        fmt::format("the test has {}, the reference has {}", bands_text(t), bands_text(r)));
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i < r.indices.size(); ++i) {
     const auto found = band_at(t, r.wavelengths_nm[i], options.wavelength_tolerance_nm);
     if (!found)
       throw MismatchError(fmt::format("the reference has a band at {:g} nm, the test has none ({})",
                                       r.wavelengths_nm[i], bands_text(t)));
-    pairs.push_back({&test.channels[*found], &reference.channels[r.indices[i]],
-                     r.wavelengths_nm[i]});
+    pairs.push_back(
+        {&test.channels[*found], &reference.channels[r.indices[i]], r.wavelengths_nm[i]});
   }
   return pairs;
 }

@@ -21,7 +21,8 @@ struct DifferenceChannel {
   double sigmas(std::size_t pixel) const;
 };
 
-/// Signed difference of two images of equal size, channel by channel. Positive: the test is brighter.
+/// Signed difference of two images of equal size, channel by channel. Positive: the test is
+/// brighter.
 struct DifferenceMap {
   int width = 0;
   int height = 0;

@@ -74,7 +74,8 @@ DifferenceStatistics difference_statistics(const DifferenceMap& map) {
       magnitudes.push_back(static_cast<float>(std::abs(d)));
     }
   }
-  const double n = static_cast<double>(magnitudes.size());  // n = 0 leaves NaN: nothing was compared
+  const double n =
+      static_cast<double>(magnitudes.size());  // n = 0 leaves NaN: nothing was compared
   s.bias = sum / n;
   s.mean_absolute = sum_abs / n;
   s.rms = std::sqrt(sum_square / n);
@@ -102,7 +103,8 @@ DifferenceGate apply_limits(const DifferenceMap& map, const DifferenceLimits& li
       finite = finite && is_finite(channel, i) && !std::isnan(magnitude);
       if (!finite) break;
       worst = std::max(worst, magnitude);
-      if (std::isfinite(magnitude) && (magnitude > gate.largest || gate.largest_at.channel.empty())) {
+      if (std::isfinite(magnitude) &&
+          (magnitude > gate.largest || gate.largest_at.channel.empty())) {
         gate.largest = magnitude;
         gate.largest_at = position(map, i, channel.name);
       }

@@ -22,7 +22,7 @@ struct DifferenceStatistics {
   double bias = 0.0;           ///< mean d
   double mean_absolute = 0.0;  ///< mean |d|
   double rms = 0.0;            ///< sqrt(mean d^2)
-  double relative_bias = 0.0;           ///< sum d / sum |reference|; NaN if the reference is black
+  double relative_bias = 0.0;  ///< sum d / sum |reference|; NaN if the reference is black
   double relative_mean_absolute = 0.0;  ///< sum |d| / sum |reference|
   double relative_rms = 0.0;            ///< sqrt(sum d^2 / sum reference^2)
   double max_absolute = 0.0;            ///< max |d|

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <cmath>
 #include <kainjow/mustache.hpp>
 #include <stdexcept>
 
@@ -24,9 +25,8 @@ List list() { return data(data::type::list); }
 
 /// The words and the icon of an outcome: never its colour alone.
 void set_outcome(data& target, Agreement outcome) {
-  constexpr const char* kIcons[] = {
-      "M5 12.5l4.5 4.5L19 7.5", "M12 5v9M12 18v.5", "M6.5 6.5l11 11M17.5 6.5l-11 11",
-      "M12 5v7l4 3"};
+  constexpr const char* kIcons[] = {"M5 12.5l4.5 4.5L19 7.5", "M12 5v9M12 18v.5",
+                                    "M6.5 6.5l11 11M17.5 6.5l-11 11", "M12 5v7l4 3"};
   const std::string text = to_text(outcome);
   target.set("outcome", text);
   target.set("outcome_class", outcome == Agreement::not_run ? "fails" : text);
@@ -102,7 +102,8 @@ std::string checked_svg(const std::string& svg) {
 }
 
 data block_data(const Figure& figure) {
-  data d = texts({{"figure_title", figure.title}, {"svg", checked_svg(figure.svg)},
+  data d = texts({{"figure_title", figure.title},
+                  {"svg", checked_svg(figure.svg)},
                   {"caption", figure.caption}});
   d.set("is_figure", true);
   return d;
@@ -114,7 +115,8 @@ data block_data(const PictureRow& row) {
   d.set("several", row.panels.size() > 1);
   List panels = list();
   for (const auto& p : row.panels)
-    panels << texts({{"panel_title", p.title}, {"alt", p.alt},
+    panels << texts({{"panel_title", p.title},
+                     {"alt", p.alt},
                      {"png", detail::base64_encode(p.picture.png)},
                      {"width", std::to_string(p.picture.width_px)},
                      {"height", std::to_string(p.picture.height_px)},
@@ -125,10 +127,17 @@ data block_data(const PictureRow& row) {
   return d;
 }
 
+/// Counts are whole and are written so.
+std::string check_number(double value) {
+  const bool whole = value == std::floor(value) && std::abs(value) < 1e9;
+  return whole ? fixed_text(value, 0) : number_text(value, 4);
+}
 
 data check_data(const Check& check) {
-  data d = texts({{"name", check.name}, {"measured", number_text(check.measured, 4)},
-                  {"limit", number_text(check.limit, 3)}, {"check_unit", unit_text(check.unit)},
+  data d = texts({{"name", check.name},
+                  {"measured", check_number(check.measured)},
+                  {"limit", check_number(check.limit)},
+                  {"check_unit", unit_text(check.unit)},
                   {"message", check.message}});
   set_outcome(d, check.outcome);
   return d;
@@ -150,14 +159,18 @@ data section_data(const Section& section, std::size_t index) {
 }  // namespace
 
 std::string to_html(const Report& report) {
-  data d = texts({{"title", report.title}, {"subtitle", report.subtitle},
-                  {"sentence", report.verdict.sentence}, {"style", embedded::kReportStyle},
+  data d = texts({{"title", report.title},
+                  {"subtitle", report.subtitle},
+                  {"sentence", report.verdict.sentence},
+                  {"style", embedded::kReportStyle},
                   {"script", embedded::kReportScript}});
   set_outcome(d, report.verdict.outcome);
   List key_numbers = list(), sections = list(), checks = list(), provenance = list();
   for (const auto& n : report.key_numbers)
-    key_numbers << texts({{"label", n.label}, {"value", number_text(n.value, n.digits)},
-                          {"key_unit", unit_text(n.unit)}, {"note", n.note}});
+    key_numbers << texts({{"label", n.label},
+                          {"value", number_text(n.value, n.digits)},
+                          {"key_unit", unit_text(n.unit)},
+                          {"note", n.note}});
   for (std::size_t i = 0; i < report.sections.size(); ++i)
     sections << section_data(report.sections[i], i);
   for (const auto& c : report.checks) checks << check_data(c);

@@ -89,7 +89,8 @@ Block block(const Json& json) {
   const std::string kind = text(json, "kind");
   if (kind == "paragraph") return Paragraph{text(json, "text")};
   if (kind == "table") return table(json);
-  if (kind == "figure") return Figure{text(json, "title"), drawing(json, "svg"), text(json, "caption")};
+  if (kind == "figure")
+    return Figure{text(json, "title"), drawing(json, "svg"), text(json, "caption")};
   if (kind == "pictures") return picture_row(json);
   throw std::invalid_argument("no block is called '" + kind + "'");
 }
@@ -97,8 +98,13 @@ Block block(const Json& json) {
 Report read(const Json& json) {
   if (json.at("truebox_report") != 1) throw std::invalid_argument("another version of the format");
   const Json& verdict = json.at("verdict");
-  Report report{text(json, "title"), text(json, "subtitle"),
-                {agreement(verdict, "outcome"), text(verdict, "sentence")}, {}, {}, {}, {}};
+  Report report{text(json, "title"),
+                text(json, "subtitle"),
+                {agreement(verdict, "outcome"), text(verdict, "sentence")},
+                {},
+                {},
+                {},
+                {}};
   for (const auto& n : json.at("key_numbers"))
     report.key_numbers.push_back(
         {text(n, "label"), number(n.at("value")), text(n, "unit"), digits(n), text(n, "note")});
@@ -121,8 +127,8 @@ Report from_json(const std::string& json_text, const std::string& file) {
   try {
     return read(Json::parse(json_text));
   } catch (const Json::parse_error& error) {
-    const auto end = json_text.begin() +
-                     static_cast<std::ptrdiff_t>(std::min(error.byte, json_text.size()));
+    const auto end =
+        json_text.begin() + static_cast<std::ptrdiff_t>(std::min(error.byte, json_text.size()));
     const auto line = 1 + std::count(json_text.begin(), end, '\n');
     throw InputError(file, static_cast<int>(line), "JSON", error.what());
   } catch (const Json::exception& error) {

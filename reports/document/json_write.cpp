@@ -20,13 +20,17 @@ Json number(double value) {
 Json text(const std::string& value) { return valid_text(value); }
 
 Json write(const KeyNumber& n) {
-  return {{"label", text(n.label)}, {"value", number(n.value)}, {"unit", text(n.unit)},
-          {"digits", n.digits}, {"note", text(n.note)}};
+  return {{"label", text(n.label)},
+          {"value", number(n.value)},
+          {"unit", text(n.unit)},
+          {"digits", n.digits},
+          {"note", text(n.note)}};
 }
 
 Json write(const Check& c) {
-  return {{"name", text(c.name)}, {"outcome", to_text(c.outcome)}, {"measured", number(c.measured)},
-          {"limit", number(c.limit)}, {"unit", text(c.unit)}, {"message", text(c.message)}};
+  return {{"name", text(c.name)},           {"outcome", to_text(c.outcome)},
+          {"measured", number(c.measured)}, {"limit", number(c.limit)},
+          {"unit", text(c.unit)},           {"message", text(c.message)}};
 }
 
 Json write(const Cell& cell) {
@@ -39,8 +43,10 @@ Json write(const Cell& cell) {
 }
 
 Json write(const Picture& p) {
-  return {{"png_base64", detail::base64_encode(p.png)}, {"width_px", p.width_px},
-          {"height_px", p.height_px}, {"scale_bar_svg", text(p.scale_bar_svg)},
+  return {{"png_base64", detail::base64_encode(p.png)},
+          {"width_px", p.width_px},
+          {"height_px", p.height_px},
+          {"scale_bar_svg", text(p.scale_bar_svg)},
           {"note", text(p.note)}};
 }
 
@@ -49,25 +55,29 @@ Json write_block(const Paragraph& p) { return {{"kind", "paragraph"}, {"text", t
 Json write_block(const Table& table) {
   Json columns = Json::array(), rows = Json::array();
   for (const auto& c : table.columns)
-    columns.push_back({{"name", text(c.name)}, {"unit", text(c.unit)}, {"digits", c.digits},
-                       {"fixed", c.fixed}});
+    columns.push_back(
+        {{"name", text(c.name)}, {"unit", text(c.unit)}, {"digits", c.digits}, {"fixed", c.fixed}});
   for (const auto& row : table.rows) {
     Json cells = Json::array();
     for (const auto& cell : row) cells.push_back(write(cell));
     rows.push_back(std::move(cells));
   }
-  return {{"kind", "table"}, {"caption", text(table.caption)}, {"columns", columns}, {"rows", rows}};
+  return {
+      {"kind", "table"}, {"caption", text(table.caption)}, {"columns", columns}, {"rows", rows}};
 }
 
 Json write_block(const Figure& f) {
-  return {{"kind", "figure"}, {"title", text(f.title)}, {"svg", text(f.svg)},
+  return {{"kind", "figure"},
+          {"title", text(f.title)},
+          {"svg", text(f.svg)},
           {"caption", text(f.caption)}};
 }
 
 Json write_block(const PictureRow& row) {
   Json panels = Json::array();
   for (const auto& p : row.panels)
-    panels.push_back({{"title", text(p.title)}, {"alt", text(p.alt)}, {"picture", write(p.picture)}});
+    panels.push_back(
+        {{"title", text(p.title)}, {"alt", text(p.alt)}, {"picture", write(p.picture)}});
   return {{"kind", "pictures"}, {"caption", text(row.caption)}, {"panels", panels}};
 }
 
@@ -77,8 +87,9 @@ std::string to_json(const Report& report) {
   Json json = {{"truebox_report", 1},
                {"title", text(report.title)},
                {"subtitle", text(report.subtitle)},
-               {"verdict", {{"outcome", to_text(report.verdict.outcome)},
-                            {"sentence", text(report.verdict.sentence)}}}};
+               {"verdict",
+                {{"outcome", to_text(report.verdict.outcome)},
+                 {"sentence", text(report.verdict.sentence)}}}};
   for (const char* list : {"key_numbers", "checks", "sections", "provenance"})
     json[list] = Json::array();
   for (const auto& n : report.key_numbers) json["key_numbers"].push_back(write(n));

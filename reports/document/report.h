@@ -37,7 +37,7 @@ struct KeyNumber {
   std::string label;
   double value = 0.0;
   std::string unit{};
-  int digits = 3;    ///< significant
+  int digits = 3;      ///< significant
   std::string note{};  ///< a few words: "limit 1", "k = 2"
 };
 
@@ -52,7 +52,8 @@ struct Column {
   bool fixed = false;  ///< a fixed number of decimals, so that the column lines up
 };
 
-/// A text or a number, the number perhaps with its standard uncertainty, either perhaps with a mark.
+/// A text or a number, the number perhaps with its standard uncertainty, either perhaps with a
+/// mark.
 struct Cell {
   std::string text;
   std::optional<double> number;

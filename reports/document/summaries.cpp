@@ -22,10 +22,9 @@ std::string property(const char* name, const std::string& value) {
 }
 
 std::string test_case(const std::string& suite, const Check& check) {
-  const std::string summary =
-      fmt::format("{}: measured {}, limit {}. {}", to_text(check.outcome),
-                  with_unit(check.measured, check.unit), with_unit(check.limit, check.unit),
-                  check.message);
+  const std::string summary = fmt::format("{}: measured {}, limit {}. {}", to_text(check.outcome),
+                                          with_unit(check.measured, check.unit),
+                                          with_unit(check.limit, check.unit), check.message);
   std::string xml = fmt::format("    <testcase classname=\"{}\" name=\"{}\" time=\"0\">\n", suite,
                                 xml_escape(check.name));
   xml += "      <properties>\n" + property("measured", plain_number(check.measured)) +
@@ -79,8 +78,9 @@ std::string to_junit(const Report& report) {
 
 std::string to_markdown(const Report& report) {
   constexpr std::size_t kRoom = 900'000;  // bytes; GitHub drops a summary of over 1 MiB
-  std::string md = fmt::format("## {}\n\n**{}**: {}\n", markdown_text(report.title),
-                               icon(report.verdict.outcome), markdown_text(report.verdict.sentence));
+  std::string md =
+      fmt::format("## {}\n\n**{}**: {}\n", markdown_text(report.title),
+                  icon(report.verdict.outcome), markdown_text(report.verdict.sentence));
   if (!report.subtitle.empty()) md += "\n" + markdown_text(report.subtitle) + "\n";
   if (!report.key_numbers.empty()) md += "\n";
   for (const auto& n : report.key_numbers)

@@ -14,7 +14,8 @@ constexpr std::string_view kNameCharacters =
 constexpr std::string_view kNamespace = "http://www.w3.org/2000/svg";
 
 std::string_view take_name(std::string_view& s) {
-  const std::string_view name = s.substr(0, std::min(s.find_first_not_of(kNameCharacters), s.size()));
+  const std::string_view name =
+      s.substr(0, std::min(s.find_first_not_of(kNameCharacters), s.size()));
   s.remove_prefix(name.size());
   return name;
 }
@@ -28,7 +29,8 @@ bool attribute_is_plain(std::string_view name, std::string_view value) {
   if (name.empty() || name.starts_with("on") || name.find("href") != name.npos || name == "src")
     return false;
   // A style or a fill could fetch something, or hide that it does behind escapes.
-  for (std::string_view bad : {"url", "URL", "Url", "://", "\\", "@", "&", "<", ">", "/*", "expression"})
+  for (std::string_view bad :
+       {"url", "URL", "Url", "://", "\\", "@", "&", "<", ">", "/*", "expression"})
     if (value.find(bad) != value.npos) return false;
   return true;
 }

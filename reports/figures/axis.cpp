@@ -64,9 +64,8 @@ ValueRange AxisScale::nice_range(ValueRange data, bool logarithmic) {
 }
 
 double AxisScale::operator()(double value) const {
-  const double t = logarithmic_
-                       ? std::log(value / range_.low) / std::log(range_.high / range_.low)
-                       : (value - range_.low) / (range_.high - range_.low);
+  const double t = logarithmic_ ? std::log(value / range_.low) / std::log(range_.high / range_.low)
+                                : (value - range_.low) / (range_.high - range_.low);
   return from_ + t * (to_ - from_);
 }
 

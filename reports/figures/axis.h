@@ -13,7 +13,7 @@ namespace truebox {
 struct Axis {
   std::string quantity;
   std::string unit;
-  bool logarithmic = false;  ///< values must then be positive; others are left out
+  bool logarithmic = false;           ///< values must then be positive; others are left out
   std::optional<ValueRange> range{};  ///< found from the data if not given
 };
 
@@ -25,8 +25,8 @@ class AxisScale {
   /// A rounded-out range for data in [low, high].
   static ValueRange nice_range(ValueRange data, bool logarithmic);
 
-  double operator()(double value) const;     ///< position; may lie outside the paper
-  bool shows(double value) const;            ///< finite, inside the range
+  double operator()(double value) const;  ///< position; may lie outside the paper
+  bool shows(double value) const;         ///< finite, inside the range
   const std::vector<double>& ticks() const { return ticks_; }
   std::string tick_label(double tick) const;
 

@@ -24,7 +24,8 @@ struct ValueRange {
   double high = 1.0;
 };
 
-/// The finite values' range from quantile q to 1 - q (q = 0: all of them); {0, 1} if there are none.
+/// The finite values' range from quantile q to 1 - q (q = 0: all of them); {0, 1} if there are
+/// none.
 ValueRange value_range(std::span<const float> values, double q = 0.0);
 
 /// The q-quantile of |v|: a limit for signed pictures, symmetric about zero. Never 0.

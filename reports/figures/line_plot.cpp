@@ -31,12 +31,15 @@ std::string marker(std::size_t series, double x, double y) {
       return fmt::format("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"6.6\" height=\"6.6\"/>", x - 3.3,
                          y - 3.3);
     case 2: return fmt::format("<path d=\"M{:.2f} {:.2f}l4.2 7.4h-8.4z\"/>", x, y - 4.8);
-    default: return fmt::format("<path d=\"M{:.2f} {:.2f}l4.6 4.6l-4.6 4.6l-4.6 -4.6z\"/>", x, y - 4.6);
+    default:
+      return fmt::format("<path d=\"M{:.2f} {:.2f}l4.6 4.6l-4.6 4.6l-4.6 -4.6z\"/>", x, y - 4.6);
   }
 }
 
 void require_equal_lengths(const PlotSeries& s) {
-  const auto fits = [&](const std::vector<double>& v) { return v.empty() || v.size() == s.x.size(); };
+  const auto fits = [&](const std::vector<double>& v) {
+    return v.empty() || v.size() == s.x.size();
+  };
   if (s.y.size() != s.x.size() || !fits(s.u_y) || !fits(s.half_width_x))
     throw std::invalid_argument("series '" + s.name + "' has vectors of different lengths");
 }
@@ -99,8 +102,9 @@ std::string line(const PlotSeries& s, const AxisScale& x, const AxisScale& y) {
     pen_down = shown;
   }
   if (path.empty()) return "";
-  return fmt::format("<path fill=\"none\" stroke-width=\"2\" stroke-linejoin=\"round\"{} d=\"{}\"/>",
-                     s.dashed ? " stroke-dasharray=\"6 5\"" : "", path);
+  return fmt::format(
+      "<path fill=\"none\" stroke-width=\"2\" stroke-linejoin=\"round\"{} d=\"{}\"/>",
+      s.dashed ? " stroke-dasharray=\"6 5\"" : "", path);
 }
 
 std::string bars(const PlotSeries& s, std::size_t i, const AxisScale& x, const AxisScale& y) {
@@ -108,14 +112,17 @@ std::string bars(const PlotSeries& s, std::size_t i, const AxisScale& x, const A
   const double px = x(s.x[i]), py = y(s.y[i]);
   const auto inside = [](double v, double a, double b) { return std::clamp(v, a, b); };
   if (!s.half_width_x.empty())
-    svg += fmt::format("<path stroke-opacity=\"0.55\" stroke-width=\"1.4\" d=\"M{:.2f} {:.2f}H{:.2f}\"/>",
-                       inside(x(s.x[i] - s.half_width_x[i]), kLeft, kRight), py,
-                       inside(x(s.x[i] + s.half_width_x[i]), kLeft, kRight));
+    svg += fmt::format(
+        "<path stroke-opacity=\"0.55\" stroke-width=\"1.4\" d=\"M{:.2f} {:.2f}H{:.2f}\"/>",
+        inside(x(s.x[i] - s.half_width_x[i]), kLeft, kRight), py,
+        inside(x(s.x[i] + s.half_width_x[i]), kLeft, kRight));
   if (s.u_y.empty() || s.line || !std::isfinite(s.u_y[i])) return svg;
   const double low = y.shows(s.y[i] - s.u_y[i]) ? y(s.y[i] - s.u_y[i]) : kPlotBottom;
   const double high = y.shows(s.y[i] + s.u_y[i]) ? y(s.y[i] + s.u_y[i]) : kPlotTop;
-  return svg + fmt::format("<path stroke-width=\"1.4\" d=\"M{0:.2f} {1:.2f}V{2:.2f}M{3:.2f} {1:.2f}h7"
-                           "M{3:.2f} {2:.2f}h7\"/>", px, low, high, px - 3.5);
+  return svg + fmt::format(
+                   "<path stroke-width=\"1.4\" d=\"M{0:.2f} {1:.2f}V{2:.2f}M{3:.2f} {1:.2f}h7"
+                   "M{3:.2f} {2:.2f}h7\"/>",
+                   px, low, high, px - 3.5);
 }
 
 std::string draw(const PlotSeries& s, std::size_t index, const AxisScale& x, const AxisScale& y) {
@@ -148,7 +155,8 @@ std::pair<std::string, int> legend(const LinePlot& plot) {
       svg += fmt::format("<path stroke-width=\"2\"{} d=\"M{} {}h22\"/>",
                          s.dashed ? " stroke-dasharray=\"6 5\"" : "", x, y);
     if (s.markers || !s.line) svg += marker(i, x + 11, y);
-    svg += fmt::format("</g><text x=\"{}\" y=\"{}\">{}</text>", x + 28, y + 4.5, xml_escape(s.name));
+    svg +=
+        fmt::format("</g><text x=\"{}\" y=\"{}\">{}</text>", x + 28, y + 4.5, xml_escape(s.name));
     x += width;
   }
   return {svg, plot.series.empty() ? 0 : row + 1};

@@ -8,7 +8,8 @@
 
 namespace truebox {
 
-/// One curve or one set of points. Vectors are as long as x, or empty where there is nothing to show.
+/// One curve or one set of points. Vectors are as long as x, or empty where there is nothing to
+/// show.
 struct PlotSeries {
   std::string name;
   std::vector<double> x;
@@ -20,8 +21,9 @@ struct PlotSeries {
   bool dashed = false;  ///< for a law to compare with, such as an expected order
 };
 
-/// Lines and points over two axes, linear or logarithmic. The first six series keep apart by colour,
-/// marker and dash alike. Values that are not finite break a line and are left out as points.
+/// Lines and points over two axes, linear or logarithmic. The first six series keep apart by
+/// colour, marker and dash alike. Values that are not finite break a line and are left out as
+/// points.
 struct LinePlot {
   std::string title;  ///< read to those who cannot see the plot
   Axis x;

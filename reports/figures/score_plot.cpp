@@ -105,14 +105,15 @@ std::string z_histogram_svg(const std::string& title, std::span<const double> z)
     counts[static_cast<std::size_t>(bin)] += 1.0;
   }
   const double n = static_cast<double>(finite.size());
-  const double top = std::max({*std::max_element(counts.begin(), counts.end()),
-                               expected_count(kBins / 2, n), 1.0});
+  const double top = std::max(
+      {*std::max_element(counts.begin(), counts.end()), expected_count(kBins / 2, n), 1.0});
   const AxisScale x({kLowest, -kLowest}, false, kLeft, kRight);
   const AxisScale y(AxisScale::nice_range({0.0, top}, false), false, kBottom, kTop);
   std::string svg = open(title, kBottom + 66);
   for (double t : y.ticks()) {
-    svg += fmt::format("<path d=\"M{} {:.2f}H{}\" stroke=\"currentColor\" stroke-opacity=\"0.16\"/>",
-                       kLeft, y(t), kRight);
+    svg +=
+        fmt::format("<path d=\"M{} {:.2f}H{}\" stroke=\"currentColor\" stroke-opacity=\"0.16\"/>",
+                    kLeft, y(t), kRight);
     svg += text_at(kLeft - 7, y(t) + 4.5, "end", y.tick_label(t));
   }
   std::string expected;
@@ -125,14 +126,16 @@ std::string z_histogram_svg(const std::string& title, std::span<const double> z)
     expected += fmt::format("{}{:.2f} {:.2f}", bin == 0 ? 'M' : 'L', x(low + kBinWidth / 2),
                             y(expected_count(bin, n)));
   }
-  svg += fmt::format("<path fill=\"none\" stroke-width=\"2.2\" style=\"stroke:{}\" d=\"{}\"/>", kCurve,
-                     expected);
+  svg += fmt::format("<path fill=\"none\" stroke-width=\"2.2\" style=\"stroke:{}\" d=\"{}\"/>",
+                     kCurve, expected);
   svg += fmt::format("<path d=\"M{} {}H{}\" stroke=\"currentColor\"/>", kLeft, kBottom, kRight);
   for (double t : x.ticks()) svg += text_at(x(t), kBottom + 18, "middle", x.tick_label(t));
   svg += text_at(6, 14, "start", "count (line: expected from N(0, 1))");
   svg += text_at((kLeft + kRight) / 2, kBottom + 38, "middle", "z = (test - reference) / u");
-  return svg + text_at((kLeft + kRight) / 2, kBottom + 58, "middle",
-                       moments_text(finite, z.size() - finite.size())) + "</svg>";
+  return svg +
+         text_at((kLeft + kRight) / 2, kBottom + 58, "middle",
+                 moments_text(finite, z.size() - finite.size())) +
+         "</svg>";
 }
 
 }  // namespace truebox

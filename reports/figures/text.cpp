@@ -13,7 +13,8 @@ namespace {
 constexpr const char* kReplacement = "\xEF\xBF\xBD";  // U+FFFD
 constexpr const char* kSuperscripts[] = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
 
-/// Length of the well-formed UTF-8 sequence at the front (Unicode 15, table 3-7), 0 if there is none.
+/// Length of the well-formed UTF-8 sequence at the front (Unicode 15, table 3-7), 0 if there is
+/// none.
 std::size_t sequence_length(std::string_view s) {
   const auto byte = [&](std::size_t i) {
     return i < s.size() ? static_cast<std::uint8_t>(s[i]) : std::uint8_t{0};
@@ -111,8 +112,7 @@ std::string estimate_text(double value, double standard_uncertainty, int digits)
   const double u = standard_uncertainty;
   if (!std::isfinite(value) || !std::isfinite(u) || u <= 0.0) return number_text(value, digits);
   const int decimals = 1 - static_cast<int>(std::floor(std::log10(u)));
-  if (decimals < 0 || decimals > 8)
-    return number_text(value, digits) + " ± " + number_text(u, 2);
+  if (decimals < 0 || decimals > 8) return number_text(value, digits) + " ± " + number_text(u, 2);
   return fixed_text(value, decimals) + " ± " + fixed_text(u, decimals);
 }
 

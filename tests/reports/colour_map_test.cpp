@@ -17,10 +17,10 @@ Lab lab_of(const Rgb8& colour) {
     linear[c] = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
   }
   const auto [r, g, b] = linear;
-  return cielab({0.4124564 * r + 0.3575761 * g + 0.1804375 * b,
-                 0.2126729 * r + 0.7151522 * g + 0.0721750 * b,
-                 0.0193339 * r + 0.1191920 * g + 0.9503041 * b},
-                {0.95047, 1.0, 1.08883});
+  return cielab(
+      {0.4124564 * r + 0.3575761 * g + 0.1804375 * b, 0.2126729 * r + 0.7151522 * g + 0.0721750 * b,
+       0.0193339 * r + 0.1191920 * g + 0.9503041 * b},
+      {0.95047, 1.0, 1.08883});
 }
 
 // L* of one 8-bit step in one channel: what rounding to bytes may take back.
@@ -55,7 +55,8 @@ TEST(DivergingMap, IsNeutralAtZeroAndEquallyLightOnBothSides) {
   EXPECT_EQ(zero[0], zero[1]);
   EXPECT_EQ(zero[1], zero[2]);
   for (int i = 1; i <= 20; ++i) {
-    const Lab below = lab_of(diverging_colour(-i / 20.0)), above = lab_of(diverging_colour(i / 20.0));
+    const Lab below = lab_of(diverging_colour(-i / 20.0)),
+              above = lab_of(diverging_colour(i / 20.0));
     EXPECT_NEAR(below.L, above.L, 1.0) << i;  // both follow M cos(s); sRGB's gamut clips a little
     EXPECT_LT(above.L, lab_of(diverging_colour((i - 1) / 20.0)).L + kByteRoundingL);
     EXPECT_LT(below.b, 0.0);

@@ -52,7 +52,8 @@ TEST_F(Ocio, FollowsTheSrgbStandardAtEveryLevel) {
     const auto picture = pipeline.picture(rgb(v, v, v), 1.0);
     const double expected = 255.0 * srgb_encode(v);
     // Exact but for rounding to a whole DN, and 0.01 DN for float and matrix arithmetic.
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(picture.rgb[static_cast<std::size_t>(c)], expected, 0.51);
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(picture.rgb[static_cast<std::size_t>(c)], expected, 0.51);
   }
 }
 
@@ -73,12 +74,14 @@ TEST_F(Ocio, CountsWhatTheDisplayCannotShow) {
   EXPECT_EQ(picture.not_finite_pixels, 1u);
   EXPECT_EQ(picture.rgb[3], 255);  // clamped, not wrapped round
   EXPECT_EQ(picture.rgb[6], 0);
-  EXPECT_THAT(picture.description, HasSubstr("1 of 4 pixels clipped, 1 out of gamut, 1 not finite"));
+  EXPECT_THAT(picture.description,
+              HasSubstr("1 of 4 pixels clipped, 1 out of gamut, 1 not finite"));
 }
 
 TEST_F(Ocio, ExposureIsAStatedFactor) {
   const ColourPipeline pipeline;
-  EXPECT_EQ(pipeline.picture(rgb(4, 2, 1), 0.125).rgb, pipeline.picture(rgb(0.5, 0.25, 0.125), 1).rgb);
+  EXPECT_EQ(pipeline.picture(rgb(4, 2, 1), 0.125).rgb,
+            pipeline.picture(rgb(0.5, 0.25, 0.125), 1).rgb);
   EXPECT_THAT(pipeline.picture(rgb(4, 2, 1), 0.125).description, HasSubstr("exposure 0.125"));
   EXPECT_THROW(pipeline.picture(rgb(1, 1, 1), 0.0), std::invalid_argument);
 }

@@ -56,7 +56,8 @@ TEST(Difference, OutliersUpToTheAllowedFractionPass) {
   for (std::size_t i = 0; i < 3; ++i) test.channels[0].samples[i] = 2.0f;
   const auto outcome = [&](double fraction) {
     return apply_limits(difference_map(test, reference),
-                        {DifferenceScale::absolute, 0.1, 0.5, fraction}).outcome;
+                        {DifferenceScale::absolute, 0.1, 0.5, fraction})
+        .outcome;
   };
   EXPECT_EQ(outcome(0.03), Agreement::agrees);
   EXPECT_EQ(outcome(0.02), Agreement::fails);
@@ -69,8 +70,8 @@ TEST(Difference, BetweenTheLimitsIsAWarning) {
 }
 
 TEST(Difference, WhatIsNoNumberNeverPasses) {
-  for (const float bad : {std::numeric_limits<float>::quiet_NaN(),
-                          std::numeric_limits<float>::infinity()}) {
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     Image test = grey(8, 8, 1.0f), reference = grey(8, 8, 1.0f);
     test.channels[0].samples[9] = bad;
     reference.channels[0].samples[9] = bad;  // even where both agree

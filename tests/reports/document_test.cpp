@@ -29,10 +29,11 @@ Report sample() {
   Table table{"numbers", {{"name"}, {"value", "nm", 2, true}}, {}};
   table.rows = {{"a", Cell(1.0 / 3.0, 0.01)}, {"b", Cell(2.5, Agreement::warning)}};
   Picture picture = false_colour(2, 2, values, {0, 3}, "radiance", "W m^-2 sr^-1");
-  report.sections = {{"One",
-                      {Paragraph{"text"}, table, Figure{"E_n", en_score_svg("E_n", {{"p", 0.5}}), "c"},
-                       PictureRow{{{"Photograph", picture, "alt text"}}, "caption"}}},
-                     {"Two", {}}};
+  report.sections = {
+      {"One",
+       {Paragraph{"text"}, table, Figure{"E_n", en_score_svg("E_n", {{"p", 0.5}}), "c"},
+        PictureRow{{{"Photograph", picture, "alt text"}}, "caption"}}},
+      {"Two", {}}};
   report.checks = {{"good", Agreement::agrees, 0.5, 1.0, "1", ""},
                    {"bad", Agreement::fails, 1.25, 1.0, "1", "too large"}};
   report.provenance = {{"source", "https://example.org/data"}};
@@ -107,10 +108,9 @@ TEST(Html, AsksForNothingFromOutside) {
 
 TEST(Html, HasWhatAReaderNeeds) {
   const std::string html = to_html(sample());
-  for (const char* part :
-       {"<html lang=\"en\">", "<title>fails: A &amp; B</title>", "alt=\"alt text\"",
-        "<th scope=\"col\"", "<th scope=\"row\"", "W m⁻²", "0.333 ± 0.010", "<details open>",
-        "name=\"viewport\"", "0.300", "NaN"})
+  for (const char* part : {"<html lang=\"en\">", "<title>fails: A &amp; B</title>",
+                           "alt=\"alt text\"", "<th scope=\"col\"", "<th scope=\"row\"", "W m⁻²",
+                           "0.333 ± 0.010", "<details open>", "name=\"viewport\"", "0.300", "NaN"})
     EXPECT_THAT(html, HasSubstr(part));
   EXPECT_EQ(count(html, "<h1>"), 1u);
   EXPECT_LT(html.find("1 of 2 checks fails"), html.find("<h2>"));  // the verdict comes first
@@ -162,7 +162,8 @@ TEST(Json, MalformedInputNamesFileAndLine) {
     other.replace(other.find(from), from.size(), to);
     return other;
   };
-  EXPECT_THROW(from_json(replaced("\"truebox_report\": 1", "\"truebox_report\": 2"), "f"), InputError);
+  EXPECT_THROW(from_json(replaced("\"truebox_report\": 1", "\"truebox_report\": 2"), "f"),
+               InputError);
   EXPECT_THROW(from_json(replaced("\"fails\"", "\"great\""), "f"), InputError);
   EXPECT_THROW(from_json(replaced("iVBORw0KGgo", "aVBORw0KGgo"), "f"), InputError);
 }

@@ -42,26 +42,29 @@ TEST(ScaleBar, TellsNarrowRangesApart) {
 
 TEST(ScaleBar, IsSymmetricForSignedPictures) {
   const std::vector<float> values = {-3.0f, 1.0f};
-  const auto labels =
-      texts(signed_false_colour(2, 1, values, symmetric_limit(values), "difference", "1").scale_bar_svg);
+  const auto labels = texts(
+      signed_false_colour(2, 1, values, symmetric_limit(values), "difference", "1").scale_bar_svg);
   EXPECT_THAT(labels, ElementsAre("-3.00", "0", "3.00", "difference"));
 }
 
 TEST(FalseColour, CountsWhatLiesBeyondTheScale) {
   const std::vector<float> values = {-1.0f, 0.5f, 2.0f, std::numeric_limits<float>::quiet_NaN()};
-  EXPECT_EQ(false_colour(2, 2, values, {0, 1}, "q", "1").note,
-            "1 of 4 pixels above the scale; 1 of 4 pixels below the scale; 1 of 4 pixels not finite "
-            "(magenta)");
+  EXPECT_EQ(
+      false_colour(2, 2, values, {0, 1}, "q", "1").note,
+      "1 of 4 pixels above the scale; 1 of 4 pixels below the scale; 1 of 4 pixels not finite "
+      "(magenta)");
   EXPECT_THROW(false_colour(2, 1, values, {0, 1}, "q", "1"), std::invalid_argument);
 }
 
 TEST(LinePlot, PutsPointsWhereTheirNumbersSay) {
-  LinePlot plot{"t", {"x", "nm", false, ValueRange{0, 10}}, {"y", "1", false, ValueRange{0, 1}}, {}};
+  LinePlot plot{
+      "t", {"x", "nm", false, ValueRange{0, 10}}, {"y", "1", false, ValueRange{0, 1}}, {}};
   plot.series = {{"points", {5}, {0.5}, {0.1}, {1}, false, true}};
   const std::string svg = to_svg(plot);
-  EXPECT_THAT(svg, HasSubstr("<circle cx=\"261.00\" cy=\"149.00\""));  // the middle of 64..458, 270..28
-  EXPECT_THAT(svg, HasSubstr("M221.60 149.00H300.40"));                // 5 +- 1 nm
-  EXPECT_THAT(svg, HasSubstr("M261.00 173.20V124.80"));                // 0.5 +- 0.1
+  EXPECT_THAT(svg,
+              HasSubstr("<circle cx=\"261.00\" cy=\"149.00\""));  // the middle of 64..458, 270..28
+  EXPECT_THAT(svg, HasSubstr("M221.60 149.00H300.40"));           // 5 +- 1 nm
+  EXPECT_THAT(svg, HasSubstr("M261.00 173.20V124.80"));           // 0.5 +- 0.1
   EXPECT_THAT(texts(svg), testing::IsSupersetOf({"x / nm", "y", "points"}));
 }
 
@@ -111,7 +114,10 @@ TEST(NumberText, KeepsTheDigitsThatAreKnown) {
 }
 
 TEST(ValidText, ReplacesWhatIsNoUtf8OrNoXml) {
-  EXPECT_EQ(valid_text("a\xff" "b\x01" "c"), "a\uFFFDb\uFFFDc");
+  EXPECT_EQ(valid_text("a\xff"
+                       "b\x01"
+                       "c"),
+            "a\uFFFDb\uFFFDc");
   EXPECT_EQ(valid_text("\xC0\xAF"), "\uFFFD\uFFFD");  // an overlong '/'
   EXPECT_EQ(valid_text("µ √ 😀\n"), "µ √ 😀\n");
 }
