@@ -136,7 +136,7 @@ MergeResult merge_exposures(const std::vector<Frame>& frames, const std::vector<
     photograph.value[p] = static_cast<float>(rate.value);
     photograph.variance[p] = static_cast<float>(rate.variance);
     photograph.exposures_used[p] = static_cast<std::uint8_t>(rate.used);
-    if (rate.used < 2) continue;
+    if (rate.used < 2 || (!options.linearity_mask.empty() && !options.linearity_mask[p])) continue;
     for (std::size_t i = 0; i < count; ++i) {
       if (!use[i]) continue;
       const double expected = rate.value * readings[i].exposure_s;

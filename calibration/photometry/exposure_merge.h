@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "photometry/camera_response.h"
@@ -15,12 +16,13 @@ struct MergeOptions {
   double floor_dn = 0.0;
   NoiseModel noise;
   CameraResponse response;
+  std::vector<std::uint8_t> linearity_mask;  ///< photosites that judge linearity; empty: all
 };
 
 /// A linear photograph and how well its exposures agree.
 struct MergeResult {
   Photograph photograph;
-  double chi2_per_dof = 0.0;  ///< of the exposures about the merged rate, all photosites pooled
+  double chi2_per_dof = 0.0;  ///< of the exposures about the merged rate, photosites pooled
   std::size_t dof = 0;
   std::vector<double> exposures_s;
   std::vector<double> mean_ratio;  ///< reading over merged rate, a mean for each exposure; 0: unused
