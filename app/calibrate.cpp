@@ -92,7 +92,8 @@ void add_calibrate_command(CLI::App& program, Action& chosen) {
   command->footer(
       "Example:\n  truebox calibrate reference/llanos_narrowband/measurement.toml -o calibrated\n"
       "writes an OpenEXR file a band (value, variance, exposures used) and calibration.json");
-  command->callback([arguments, &chosen] { chosen = [arguments] { return calibrate(*arguments); }; });
+  command->callback(
+      [arguments, &chosen] { chosen = [arguments] { return calibrate(*arguments); }; });
 }
 
 }  // namespace truebox::app

@@ -107,7 +107,8 @@ void print_table(const ChartMeasurement& measurement, bool all_patches) {
                    b.name, r.patch, r.measured.value, r.measured.standard_uncertainty,
                    r.reference.value, r.reference.standard_uncertainty, r.en.value,
                    r.at_bound ? "  at bound" : r.standard ? "  standard" : "");
-  fmt::print("\n{} of {} held-out readings agree\n", measurement.agreeing(), measurement.held_out());
+  fmt::print("\n{} of {} held-out readings agree\n", measurement.agreeing(),
+             measurement.held_out());
 }
 
 int fit(const FitArguments& arguments) {
@@ -139,7 +140,8 @@ void add_fit_command(CLI::App& program, Action& chosen) {
   auto arguments = std::make_shared<FitArguments>();
   command->add_option("MEASUREMENT", arguments->measurement, "measurement file (TOML)")->required();
   command->add_option("-o,--output", arguments->output, "JSON file with every number");
-  command->add_flag("--all", arguments->all_patches, "print every patch, not only those that differ");
+  command->add_flag("--all", arguments->all_patches,
+                    "print every patch, not only those that differ");
   command->footer(
       "Example:\n  truebox fit reference/llanos_narrowband/measurement.toml -o fit.json\n"
       "exit code 5 if a fit did not converge or is rank deficient (the null direction is named)");

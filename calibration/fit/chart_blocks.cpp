@@ -57,7 +57,8 @@ std::vector<PatchBlock> chart_blocks(const Photograph& photograph, char site,
 }
 
 CellPlane cell_plane(const Photograph& photograph, char site) {
-  CellPlane plane{.width = photograph.width / 2, .height = photograph.height / 2, .value = {}, .variance = {}};
+  CellPlane plane{
+      .width = photograph.width / 2, .height = photograph.height / 2, .value = {}, .variance = {}};
   for (int cy = 0; cy < plane.height; ++cy)
     for (int cx = 0; cx < plane.width; ++cx) {
       double value = 0.0, variance = 0.0, n = 0.0;
@@ -74,7 +75,8 @@ CellPlane cell_plane(const Photograph& photograph, char site) {
   return plane;
 }
 
-std::vector<std::uint8_t> cell_labels(const std::vector<std::uint8_t>& labels, int width, int height) {
+std::vector<std::uint8_t> cell_labels(const std::vector<std::uint8_t>& labels, int width,
+                                      int height) {
   std::vector<std::uint8_t> cells;
   for (int cy = 0; cy < height / 2; ++cy)
     for (int cx = 0; cx < width / 2; ++cx) {

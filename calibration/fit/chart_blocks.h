@@ -38,6 +38,7 @@ struct CellPlane {
 CellPlane cell_plane(const Photograph& photograph, char site);
 
 /// The label of each 2 x 2 cell whose four pixels agree, else 0.
-std::vector<std::uint8_t> cell_labels(const std::vector<std::uint8_t>& labels, int width, int height);
+std::vector<std::uint8_t> cell_labels(const std::vector<std::uint8_t>& labels, int width,
+                                      int height);
 
 }  // namespace truebox

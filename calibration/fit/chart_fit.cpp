@@ -23,7 +23,8 @@ class BlockCost : public ceres::CostFunction {
         terms_(field_terms(order, block.x, block.y)) {
     set_num_residuals(1);
     *mutable_parameter_block_sizes() = {1, 1, 1};
-    if (!terms_.empty()) mutable_parameter_block_sizes()->push_back(static_cast<int>(terms_.size()));
+    if (!terms_.empty())
+      mutable_parameter_block_sizes()->push_back(static_cast<int>(terms_.size()));
   }
 
   bool Evaluate(double const* const* p, double* residuals, double** jacobians) const override {
@@ -148,7 +149,8 @@ Free free_parameters(const ChartProblem& problem, const ChartFitOptions& options
   return free;
 }
 
-Eigen::MatrixXd jacobian(ceres::Problem& problem, const Free& free, std::vector<double>& residuals) {
+Eigen::MatrixXd jacobian(ceres::Problem& problem, const Free& free,
+                         std::vector<double>& residuals) {
   ceres::Problem::EvaluateOptions options;
   options.parameter_blocks = free.blocks;
   ceres::CRSMatrix sparse;
@@ -157,7 +159,8 @@ Eigen::MatrixXd jacobian(ceres::Problem& problem, const Free& free, std::vector<
   for (int r = 0; r < sparse.num_rows; ++r)
     for (int k = sparse.rows[static_cast<std::size_t>(r)];
          k < sparse.rows[static_cast<std::size_t>(r) + 1]; ++k)
-      dense(r, sparse.cols[static_cast<std::size_t>(k)]) = sparse.values[static_cast<std::size_t>(k)];
+      dense(r, sparse.cols[static_cast<std::size_t>(k)]) =
+          sparse.values[static_cast<std::size_t>(k)];
   return dense;
 }
 
@@ -186,7 +189,8 @@ Eigen::MatrixXd covariance(const Eigen::MatrixXd& j, const Free& free, FitSummar
   summary.condition = smallest > 0.0 ? largest / smallest : std::numeric_limits<double>::infinity();
   if (!(smallest > kRankTolerance * largest)) {
     summary.outcome = Outcome::rank_deficient;
-    const Eigen::VectorXd direction = norms.cwiseInverse().asDiagonal() * eigen.eigenvectors().col(0);
+    const Eigen::VectorXd direction =
+        norms.cwiseInverse().asDiagonal() * eigen.eigenvectors().col(0);
     summary.null_direction = described_direction(direction, free);
     return {};
   }
@@ -206,7 +210,8 @@ void fill_uncertainties(const ChartProblem& problem, const ChartFitOptions& opti
   for (std::size_t i = 0; i < residuals.size(); ++i)
     (i < blocks ? summary.chi2 : summary.chi2_standards) += residuals[i] * residuals[i];
   std::size_t standards = residuals.size() - blocks;
-  const double dof = static_cast<double>(blocks + standards) - static_cast<double>(free.names.size());
+  const double dof =
+      static_cast<double>(blocks + standards) - static_cast<double>(free.names.size());
   summary.chi2_per_dof = dof > 0.0 ? (summary.chi2 + summary.chi2_standards) / dof : 0.0;
   const double birge = std::sqrt(std::max(1.0, summary.chi2_per_dof));
   j.topRows(static_cast<Eigen::Index>(blocks)) /= birge;

@@ -166,8 +166,10 @@ ChartPlanes make_planes(const BandContext& context, const BandMeasurement& band)
     planes.photograph.push_back(static_cast<float>(cells.value[i] / gain));
     planes.photograph_variance.push_back(static_cast<float>(cells.variance[i] / (gain * gain)));
     if (planes.patch[i] == 0) continue;
-    const double x = context.frame.x(2.0 * static_cast<double>(i % static_cast<std::size_t>(cells.width)) + 1.0);
-    const double y = context.frame.y(2.0 * static_cast<double>(i / static_cast<std::size_t>(cells.width)) + 1.0);
+    const double x =
+        context.frame.x(2.0 * static_cast<double>(i % static_cast<std::size_t>(cells.width)) + 1.0);
+    const double y =
+        context.frame.y(2.0 * static_cast<double>(i / static_cast<std::size_t>(cells.width)) + 1.0);
     double light = 0.0;
     for (const ChartFit& fit : band.fits)
       light += fit.gain / gain * fit.illumination(x, y) / static_cast<double>(band.fits.size());
@@ -196,8 +198,9 @@ void fit_band(const BandContext& context, const BandFiles& files, BandMeasuremen
       band.veil.value += fit.veil.value / static_cast<double>(veiled.size());
       band.veil.standard_uncertainty =
           std::max(band.veil.standard_uncertainty, fit.veil.standard_uncertainty);
-      band.veil_kept = band.veil_kept && std::abs(fit.veil.value) > context.file.fit.veil_threshold *
-                                                                        fit.veil.standard_uncertainty;
+      band.veil_kept =
+          band.veil_kept && std::abs(fit.veil.value) >
+                                context.file.fit.veil_threshold * fit.veil.standard_uncertainty;
     }
   }
   band.fits = band.veil_kept ? veiled : plain;

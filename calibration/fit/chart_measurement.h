@@ -51,7 +51,7 @@ struct ChartPlanes {
   int width = 0, height = 0;
   std::vector<float> photograph;           ///< signal / gain: reflectance x relative illumination
   std::vector<float> photograph_variance;  ///< of noise and quantisation; infinite if saturated
-  std::vector<float> prediction;           ///< (spectrometer + veil) x fitted illumination; 0 outside
+  std::vector<float> prediction;  ///< (spectrometer + veil) x fitted illumination; 0 outside
   std::vector<float> prediction_variance;  ///< spectrometer, band centre, standards, illumination
   std::vector<std::uint8_t> patch;         ///< n-th patch, 0 = outside every patch's inner area
 };

@@ -124,7 +124,8 @@ LinearPhotographs merge_photographs(const MeasurementFile& file, const Chart& ch
   };
   std::vector<std::vector<Frame>> frames;
   for (std::size_t b = 0; b < file.bands.size(); ++b) {
-    tell("read " + file.bands[b].name, 0.3 * static_cast<double>(b) / static_cast<double>(file.bands.size()));
+    tell("read " + file.bands[b].name,
+         0.3 * static_cast<double>(b) / static_cast<double>(file.bands.size()));
     frames.push_back(read_frames(file.bands[b], chart));
   }
   tell("camera response and noise", 0.3);

@@ -67,7 +67,8 @@ Rate bound(const std::vector<Reading>& readings, const MergeOptions& options) {
   const double t = longest.exposure_s;
   if (longest.raw_dn < options.saturation_dn)  // below the floor everywhere
     return {longest.signal_dn / t,
-            (variance_dn2(longest, longest.signal_dn, options) + kClippedVariance_dn2) / (t * t), 0};
+            (variance_dn2(longest, longest.signal_dn, options) + kClippedVariance_dn2) / (t * t),
+            0};
   return {shortest.signal_dn / shortest.exposure_s, std::numeric_limits<double>::infinity(), 0};
 }
 

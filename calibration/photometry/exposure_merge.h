@@ -25,7 +25,8 @@ struct MergeResult {
   double chi2_per_dof = 0.0;  ///< of the exposures about the merged rate, photosites pooled
   std::size_t dof = 0;
   std::vector<double> exposures_s;
-  std::vector<double> mean_ratio;  ///< reading over merged rate, a mean for each exposure; 0: unused
+  std::vector<double>
+      mean_ratio;  ///< reading over merged rate, a mean for each exposure; 0: unused
 };
 
 /// The rate r (DN s^-1) of every photosite from exposures t_i with linearised readings x_i:

@@ -8,7 +8,8 @@ namespace truebox {
 
 void UncertaintyBudget::add(std::string name, double standard_uncertainty) {
   if (!(standard_uncertainty >= 0.0) || !std::isfinite(standard_uncertainty))
-    throw std::invalid_argument("contribution \"" + name + "\" must be finite and not negative, is " +
+    throw std::invalid_argument("contribution \"" + name +
+                                "\" must be finite and not negative, is " +
                                 std::to_string(standard_uncertainty));
   contributions_.push_back({std::move(name), standard_uncertainty});
 }

@@ -15,7 +15,9 @@ class BayerPattern {
   explicit BayerPattern(std::string pattern);
 
   /// 'R', 'G' or 'B' of the photosite at pixel (x, y).
-  char site(int x, int y) const { return pattern_[static_cast<std::size_t>((y & 1) * 2 + (x & 1))]; }
+  char site(int x, int y) const {
+    return pattern_[static_cast<std::size_t>((y & 1) * 2 + (x & 1))];
+  }
 
   const std::string& name() const { return name_; }
 

@@ -81,7 +81,8 @@ struct MeasurementFile {
 };
 
 /// Reads and checks a measurement file; the files that it names are not opened, but must exist.
-/// InputError names file and line, what was expected and what stands there; unknown keys are errors.
+/// InputError names file and line, what was expected and what stands there; unknown keys are
+/// errors.
 MeasurementFile read_measurement(const std::filesystem::path& path);
 
 }  // namespace truebox

@@ -23,7 +23,8 @@ struct Truth {
 
 Truth some_truth() {
   Truth truth;
-  for (int p = 0; p < 24; ++p) truth.rho.push_back(p < 18 ? 0.05 + 0.045 * p : 0.08 + 0.15 * (p - 18));
+  for (int p = 0; p < 24; ++p)
+    truth.rho.push_back(p < 18 ? 0.05 + 0.045 * p : 0.08 + 0.15 * (p - 18));
   return truth;
 }
 
@@ -34,9 +35,10 @@ ChartProblem synthetic(const Truth& truth, int blocks_a_side, std::mt19937* rand
     problem.patches.push_back("patch " + std::to_string(p + 1));
     problem.standards.emplace_back();
     if (p >= 18)
-      problem.standards[p] = Estimate{truth.rho[p] + (random ? truth.standard_u * normal(*random) : 0.0),
-                                      truth.standard_u};
-    const double cx = -0.83 + 0.333 * static_cast<double>(p % 6), cy = -0.75 + 0.5 * static_cast<double>(p / 6);
+      problem.standards[p] = Estimate{
+          truth.rho[p] + (random ? truth.standard_u * normal(*random) : 0.0), truth.standard_u};
+    const double cx = -0.83 + 0.333 * static_cast<double>(p % 6),
+                 cy = -0.75 + 0.5 * static_cast<double>(p / 6);
     for (int i = 0; i < blocks_a_side * blocks_a_side; ++i) {
       PatchBlock block;
       block.patch = p;
@@ -46,7 +48,8 @@ ChartProblem synthetic(const Truth& truth, int blocks_a_side, std::mt19937* rand
       double light = 1.0;
       for (std::size_t k = 0; k < terms.size(); ++k) light += terms[k] * truth.field[k];
       const double exact = truth.gain * (truth.rho[p] + truth.veil) * light;
-      block.standard_uncertainty = (truth.relative_noise > 0.0 ? truth.relative_noise : 0.01) * exact;
+      block.standard_uncertainty =
+          (truth.relative_noise > 0.0 ? truth.relative_noise : 0.01) * exact;
       block.value = exact + (random ? block.standard_uncertainty * normal(*random) : 0.0);
       problem.blocks.push_back(block);
     }
@@ -64,7 +67,8 @@ TEST(ChartFit, RecoversTheTruthWithoutNoise) {
   for (const bool veil : {false, true}) {
     Truth truth = some_truth();
     truth.veil = veil ? 0.03 : 0.0;
-    const ChartFit fit = fit_chart(synthetic(truth, 3, nullptr), {.field_order = 2, .fit_veil = veil});
+    const ChartFit fit =
+        fit_chart(synthetic(truth, 3, nullptr), {.field_order = 2, .fit_veil = veil});
     ASSERT_EQ(fit.summary.outcome, Outcome::converged) << fit.summary.brief();
     for (std::size_t p = 0; p < 24; ++p)
       EXPECT_NEAR(fit.reflectance[p].value, truth.rho[p], 1e-6) << p;  // 1: the requirement

@@ -110,7 +110,8 @@ TEST(ExposureMerge, ASaturatedExposureNeverBiases) {
       mean += photograph.value[i] / static_cast<double>(pixels);
       sigma2 += photograph.variance[i] / static_cast<double>(pixels);
     }
-    EXPECT_LT(std::abs(mean - rate), 5.0 * std::sqrt(sigma2 / static_cast<double>(pixels))) << top_dn;
+    EXPECT_LT(std::abs(mean - rate), 5.0 * std::sqrt(sigma2 / static_cast<double>(pixels)))
+        << top_dn;
   }
 }
 

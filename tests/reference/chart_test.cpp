@@ -70,7 +70,8 @@ TEST(Chart, RefusesAnUnsourcedTable) {
 
 TEST(Chart, NamesTheLineOfAnUnsortedWavelength) {
   const auto path = temporary("unsorted.csv");
-  write(path, "# source: a\n# unit: 1\n# uncertainty: b\nwavelength_nm,dark_skin\n400,0.1\n399,0.1\n");
+  write(path,
+        "# source: a\n# unit: 1\n# uncertainty: b\nwavelength_nm,dark_skin\n400,0.1\n399,0.1\n");
   try {
     read_chart(kLabels, path, {"dark_skin"});
     FAIL();
@@ -90,7 +91,8 @@ TEST(Chart, RefusesLabelsBeyondThePatchesNamed) {
 }
 
 TEST(Frame, RefusesATruncatedTiffPngAndExr) {
-  const auto tiff = temporary("whole.tif"), png = temporary("whole.png"), exr = temporary("whole.exr");
+  const auto tiff = temporary("whole.tif"), png = temporary("whole.png"),
+             exr = temporary("whole.exr");
   const auto tiffs = kFolder + "photographs/";
   const auto first = std::filesystem::directory_iterator(tiffs)->path();
   std::filesystem::copy_file(first, tiff, std::filesystem::copy_options::overwrite_existing);

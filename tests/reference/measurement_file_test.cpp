@@ -22,8 +22,8 @@ std::string shipped_text() {
 }
 
 int line_of(const std::string& text, const std::string& needle) {
-  return 1 + static_cast<int>(std::count(text.begin(),
-                                         text.begin() + static_cast<long>(text.find(needle)), '\n'));
+  return 1 + static_cast<int>(std::count(
+                 text.begin(), text.begin() + static_cast<long>(text.find(needle)), '\n'));
 }
 
 /// A copy of the shipped file with one change, its paths made absolute.

@@ -131,7 +131,8 @@ TEST(ChartValidation, PlanesShowWhatTheTableSays) {
   for (std::size_t p = 0; p < 24; ++p) {
     ASSERT_GT(n[p], 50.0) << p;
     // 1.5 %: the two field orders are averaged before and after the division.
-    EXPECT_NEAR(ratio[p] / n[p], b.readings[p].measured.value / b.readings[p].reference.value, 0.015)
+    EXPECT_NEAR(ratio[p] / n[p], b.readings[p].measured.value / b.readings[p].reference.value,
+                0.015)
         << b.readings[p].patch;
   }
 }
