@@ -39,7 +39,7 @@
     show(index);
   };
   dialog.addEventListener("keydown", (event) => {
-    if (event.key === "ArrowRight" || event.key === " ") show(shown + 1);
+    if (event.key === "ArrowRight") show(shown + 1);
     else if (event.key === "ArrowLeft") show(shown - 1);
     else return;
     event.preventDefault();
