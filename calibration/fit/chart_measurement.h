@@ -66,7 +66,7 @@ struct BandMeasurement {
   Estimate veil;               ///< mean over the orders
   bool veil_kept = false;      ///< it exceeded the file's threshold in every order
   std::vector<SiteEvidence> sites;
-  std::vector<PatchReading> readings;  ///< one a patch
+  std::vector<PatchReading> readings;  ///< one a patch; empty, as the planes, unless converged
   ChartPlanes planes;
 
   Outcome outcome = Outcome::not_run;  ///< the worst of the fits

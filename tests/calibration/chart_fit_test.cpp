@@ -160,6 +160,13 @@ TEST(ChartFit, APatchWithoutLightIsAtItsBoundNotCertain) {
   EXPECT_EQ(fit.reflectance[4].value, 0.0);
   EXPECT_EQ(fit.reflectance[4].standard_uncertainty, 0.0);
   EXPECT_FALSE(fit.at_bound[5]);
+  // The others keep their own uncertainty: one patch in the dark says little about them. 5 %: the
+  // nine blocks of that patch no longer help to fix the illumination.
+  const ChartFit lit = fit_chart(synthetic(truth, 3, nullptr), {});
+  for (std::size_t p : {3u, 5u, 17u})
+    EXPECT_NEAR(fit.reflectance[p].standard_uncertainty / lit.reflectance[p].standard_uncertainty,
+                1.0, 0.05)
+        << p;
 }
 
 TEST(ChartFit, AProblemThatCannotBeFittedSaysWhy) {
