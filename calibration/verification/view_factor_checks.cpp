@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cstdlib>
 
 #include "provenance/provenance.h"
@@ -50,6 +51,12 @@ std::vector<Region> read_regions(const std::string& text) {
   return regions;
 }
 
+// The table gives outlines, not sides: each is turned to face the other.
+void face(Region& a, const Vec3& point) {
+  if (plane_of(a.outline).distance_m(point) < 0.0)
+    std::reverse(a.outline.begin(), a.outline.end());
+}
+
 double exchange_of(const Region& a, const Region& b) {
   double sum = 0.0;
   for (const Polygon& p : convex_pieces(a.outline, a.holes))
@@ -74,9 +81,11 @@ std::vector<AccuracyCheck> check_view_factors(const std::filesystem::path& refer
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
     const std::string& geometry = table.rows[row][1];
     if (!geometry.starts_with("A1 [") || geometry.find("blocker") != std::string::npos) continue;
-    const auto regions = read_regions(geometry);
+    auto regions = read_regions(geometry);
     if (regions.size() != 2)
       throw InputError(table.path, table.row_lines[row], "two polygons A1 and A2", geometry);
+    face(regions[0], centroid(regions[1].outline));
+    face(regions[1], centroid(regions[0].outline));
     AccuracyCheck check{"viewfactors", table.rows[row][0], 0, table.number(row, value), 0, "1", {}};
     check.computed = exchange_of(regions[0], regions[1]) / area_of(regions[0]);
     check.allowed = 1e-9 * check.certified;

@@ -141,10 +141,13 @@ class Reader {
     const toml::table& table = *node.as_table();
     try {
       if (table.contains("file")) {
-        allow_keys(table, {"file", "column"});
+        allow_keys(table, {"file", "column", "scale"});
         const auto file = path_.parent_path() / text(need(table, "file", what), "a file name");
         const auto column = text(need(table, "column", "column = \"name\""), "a column name");
-        return sample_bands(spectrum_from_table(read_table(file), column), scene_.bands);
+        const toml::node* scale = table.get("scale");  // for data that are only relative
+        auto values = sample_bands(spectrum_from_table(read_table(file), column), scene_.bands);
+        for (double& v : values) v *= scale ? number(*scale) : 1.0;
+        return values;
       }
       allow_keys(table, {"nm", "value"});
       return sample_bands(

@@ -16,13 +16,16 @@ constexpr double kHorizonTolerance = 1e-13;  // of the polygon's size: rounding 
 
 double contour_sum(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon) {
   double sum = 0.0;
-  Vec3 a = polygon.back() - point;
+  const Vec3* previous = &polygon.back();
+  Vec3 a = *previous - point;
   for (const Vec3& vertex : polygon) {
     const Vec3 b = vertex - point;
-    const Vec3 c = a.cross(b);
+    // a x b = a x (b - a), and the edge itself keeps its digits however far the polygon is.
+    const Vec3 c = a.cross(vertex - *previous);
     const double sine = c.norm();
     if (sine > 0.0) sum += std::atan2(sine, a.dot(b)) * normal.dot(c) / sine;
     a = b;
+    previous = &vertex;
   }
   return std::max(0.0, -sum / (2.0 * std::numbers::pi));
 }

@@ -2,18 +2,15 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "mesh/patch_mesh.h"
 #include "mesh/smooth_field.h"
+#include "radiometry/progress.h"
 #include "transport/visibility.h"
 
 namespace truebox {
-
-/// Told the share done, in [0, 1]; may be called from any thread, one at a time.
-using Progress = std::function<void(const std::string& stage, double share)>;
 
 struct FormFactorOptions {
   double relative_tolerance = 1e-5;  ///< of the unoccluded kernel, each pair

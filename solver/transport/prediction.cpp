@@ -249,6 +249,13 @@ BandMatrix Prediction::radiosity() const {
   return all;
 }
 
+BandMatrix Prediction::irradiance() const {
+  BandMatrix all(fine_->direct.rows(), static_cast<Index>(scene_->bands.size()));
+  for (Index i = 0; i < all.rows(); ++i)
+    all.row(i) = expand((fine_->direct.row(i) + fine_->indirect.row(i)).transpose()).transpose();
+  return all;
+}
+
 BandMatrix Prediction::radiosity_bound() const {
   const BandMatrix rho = reflectance_of(fine_->mesh, *scene_);
   BandMatrix all(rho.rows(), rho.cols());

@@ -69,6 +69,8 @@ class Prediction {
   /// Radiosity of each element of the fine grid and its bound, elements x bands of the scene.
   BandMatrix radiosity() const;
   BandMatrix radiosity_bound() const;
+  /// Mean irradiance of each element, elements x bands of the scene.
+  BandMatrix irradiance() const;
 
  private:
   void solve_grid(GridSolution& grid, double edge_m, int level, const PredictOptions& options);

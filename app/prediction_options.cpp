@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "prediction_options.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+
+#include "scene/scene_file.h"
+
+namespace truebox::app {
+
+void add_prediction_options(CLI::App& command, PredictionArguments& a) {
+  command.add_option("SCENE", a.scene, "scene file (TOML)")->required();
+  command.add_option("--elements", a.elements, "elements of the fine grid, about")
+      ->capture_default_str()
+      ->check(CLI::Range(4, 200000));
+  command.add_option("--rays", a.rays, "rays of a pair that something may stand between")
+      ->capture_default_str()
+      ->check(CLI::Range(4, 4096));
+  command.add_option("--method", a.method, "krylov (conjugate gradients) or gauss-seidel")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"krylov", "gauss-seidel"}));
+  command.add_option("--solver-bound", a.relative_bound, "stop at this relative error bound")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-13, 0.5));
+  command.add_option("--threads", a.threads, "threads, 0 for all")->check(CLI::Range(0, 1024));
+  command.add_flag("--quiet", a.quiet, "no progress");
+}
+
+Progress terminal_progress(bool quiet) {
+  if (quiet || !::isatty(STDERR_FILENO)) return {};
+  auto last = std::make_shared<int>(-1);
+  return [last](const std::string& stage, double share) {
+    const int percent = static_cast<int>(100.0 * share);
+    if (percent == *last) return;
+    *last = percent;
+    fmt::print(stderr, "\r{:<24}{:3d} %{}", stage, percent, percent == 100 ? "\r\033[K" : "");
+    std::fflush(stderr);
+  };
+}
+
+std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
+  auto predicted = std::make_unique<Predicted>();
+  predicted->scene = read_scene(a.scene);
+  std::unique_ptr<tbb::global_control> limit;
+  if (a.threads > 0)
+    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                  static_cast<std::size_t>(a.threads));
+  PredictOptions options;
+  options.elements = a.elements;
+  options.form_factors.rays = a.rays;
+  options.solve.method =
+      a.method == "krylov" ? SolveMethod::conjugate_gradient : SolveMethod::gauss_seidel;
+  options.solve.relative_bound = a.relative_bound;
+  options.progress = terminal_progress(a.quiet);
+  const auto start = std::chrono::steady_clock::now();
+  predicted->prediction = std::make_unique<Prediction>(predicted->scene, options);
+  predicted->seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return predicted;
+}
+
+std::string describe(const Predicted& p) {
+  const GridSolution& grid = p.prediction->fine();
+  const FormFactorSummary& f = grid.form_factors;
+  std::string text =
+      fmt::format("{} elements ({} on the coarse grid), {} bands, {:.2f} s\n", grid.mesh.size(),
+                  p.prediction->coarse().mesh.size(), p.scene.bands.size(), p.seconds);
+  for (const auto& reason : p.prediction->needs().reasons) text += "  " + reason + "\n";
+  if (!p.prediction->needs().interreflection) return text;
+  text += fmt::format(
+      "  form factors: {} pairs without anything between, {} hidden, {} sampled with {} rays\n",
+      f.pairs_unoccluded, f.pairs_hidden, f.pairs_sampled, f.rays);
+  if (f.buried_patches > 0)
+    text += fmt::format("  {} elements lie under another surface and see nothing\n",
+                        f.buried_patches);
+  text += f.closed ? fmt::format(
+                         "  closure: none of {} rays escaped; row sums off by {:.1e} mean, {:.1e} "
+                         "max; sampled factors scaled by at most {:.1e}, then off by {:.1e}\n",
+                         f.closure_rays, f.closure_error_mean, f.closure_error_max, f.repair_max,
+                         f.closure_residual_max)
+                   : fmt::format("  the scene is open (no repair); largest row sum {:.6f}\n",
+                                 f.row_sum_max);
+  return text + "  radiosity: " + grid.solve.brief() + "\n";
+}
+
+std::vector<SurfaceMean> surface_means(const Prediction& prediction) {
+  const PatchMesh& mesh = prediction.fine().mesh;
+  const BandMatrix radiosity = prediction.radiosity(), bound = prediction.radiosity_bound();
+  const BandMatrix irradiance = prediction.irradiance();
+  std::vector<SurfaceMean> means;
+  for (const Surface& surface : prediction.scene().surfaces) {
+    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(radiosity.cols());
+    means.push_back({surface.name, 0.0, zero, zero, zero});
+  }
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    if (!prediction.fine().usable[i]) continue;
+    SurfaceMean& mean = means[mesh.surface_of(mesh.patches[i])];
+    const double area = mesh.patches[i].area_m2;
+    const auto row = static_cast<Eigen::Index>(i);
+    mean.area_m2 += area;
+    mean.radiosity += area * radiosity.row(row).transpose();
+    mean.radiosity_bound += area * bound.row(row).transpose();
+    mean.irradiance += area * irradiance.row(row).transpose();
+  }
+  std::erase_if(means, [](const SurfaceMean& m) { return m.area_m2 == 0.0; });
+  for (SurfaceMean& mean : means) {
+    mean.radiosity /= mean.area_m2;
+    mean.radiosity_bound /= mean.area_m2;
+    mean.irradiance /= mean.area_m2;
+  }
+  return means;
+}
+
+}  // namespace truebox::app

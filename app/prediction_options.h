@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "scene/scene.h"
+#include "transport/prediction.h"
+
+namespace CLI {
+class App;
+}
+
+namespace truebox::app {
+
+/// What every command that predicts can be told.
+struct PredictionArguments {
+  std::string scene;
+  std::size_t elements = PredictOptions{}.elements;
+  int rays = FormFactorOptions{}.rays;
+  std::string method = "krylov";
+  double relative_bound = SolveOptions{}.relative_bound;
+  int threads = 0;
+  bool quiet = false;
+};
+
+void add_prediction_options(CLI::App& command, PredictionArguments& arguments);
+
+/// A scene, its prediction and how long the solve took.
+struct Predicted {
+  Scene scene;
+  std::unique_ptr<Prediction> prediction;
+  double seconds = 0.0;
+};
+
+/// Reads and solves; shows progress. The caller checks `prediction->outcome()`.
+std::unique_ptr<Predicted> predict(const PredictionArguments& arguments);
+
+/// A progress line on stderr if that is a terminal, nothing otherwise.
+Progress terminal_progress(bool quiet = false);
+
+/// What the solve did, as text for a person: elements, form factors, closure, solver, time.
+std::string describe(const Predicted& predicted);
+
+/// For each band the largest bound of any surface's mean radiosity relative to that mean, and more;
+/// written by solve and demo.
+struct SurfaceMean {
+  std::string surface;
+  double area_m2 = 0.0;
+  Eigen::VectorXd radiosity, radiosity_bound, irradiance;
+};
+std::vector<SurfaceMean> surface_means(const Prediction& prediction);
+
+}  // namespace truebox::app
