@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Speed against accuracy on the measured Cornell Box: a table for people, one JSON for plots.
+// Times depend on the machine and on what else it does; compare only within one run.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "benchmark.h"
+#include "scene/scene_file.h"
+
+namespace {
+
+using namespace truebox::benchmark;
+
+nlohmann::json as_json(const Accuracy& a) {
+  return {{"elements", a.elements},
+          {"coarse_elements", a.coarse_elements},
+          {"compared", a.compared},
+          {"solve_s", a.solve_s},
+          {"probe_s", a.probe_s},
+          {"rms_relative_error", a.rms_error},
+          {"max_relative_error", a.max_error},
+          {"rms_relative_standard_error_of_reference", a.rms_standard_error},
+          {"mean_relative_bound", a.mean_bound},
+          {"covered_share", a.covered}};
+}
+
+nlohmann::json as_json(const Kernels& k) {
+  return {{"elements", k.elements},
+          {"bands", k.bands},
+          {"triad_bytes_per_s", k.triad_bytes_per_s},
+          {"occlusion_queries_per_s", k.occlusion_queries_per_s},
+          {"form_factor_rays_per_s", k.rays_per_s},
+          {"form_factor_pairs_per_s", k.pairs_per_s},
+          {"form_factor_pairs_unoccluded_per_s", k.pairs_unoccluded_per_s},
+          {"band_product_flop_per_s", k.product_flop_per_s},
+          {"band_product_one_band_bytes_per_s", k.product_one_band_bytes_per_s},
+          {"all_bands_to_one_band_time", k.bands_time_ratio}};
+}
+
+nlohmann::json as_json(const SolverWork& w) {
+  return {{"relative_bound", w.relative_bound},
+          {"krylov_passes", w.krylov_passes},
+          {"krylov_s", w.krylov_s},
+          {"gauss_seidel_passes", w.gauss_seidel_passes},
+          {"gauss_seidel_s", w.gauss_seidel_s}};
+}
+
+void print(const Accuracy& a, double first_s) {
+  fmt::print("{:>9}{:>10.3f}{:>9.1f}{:>12.3f}{:>12.3f}{:>12.3f}{:>12.3f}{:>11.1f}\n", a.elements,
+             a.solve_s, a.solve_s / first_s, 100.0 * a.rms_error, 100.0 * a.max_error,
+             100.0 * a.rms_standard_error, 100.0 * a.mean_bound, 100.0 * a.covered);
+}
+
+void print(const Kernels& k) {
+  fmt::print("\nKernels, {} elements, {} bands\n", k.elements, k.bands);
+  const auto line = [](const char* name, double value, const char* unit) {
+    fmt::print("  {:<58}{:>10.3g} {}\n", name, value, unit);
+  };
+  line("memory bandwidth (triad)", 1e-9 * k.triad_bytes_per_s, "GB/s");
+  line("occlusion queries alone", 1e-6 * k.occlusion_queries_per_s, "M/s");
+  line("rays in form factors", 1e-6 * k.rays_per_s, "M/s");
+  line("  share of the queries alone", 100.0 * k.rays_per_s / k.occlusion_queries_per_s, "%");
+  line("pairs of form factors", 1e-6 * k.pairs_per_s, "M/s");
+  line("pairs of form factors, nothing in between", 1e-6 * k.pairs_unoccluded_per_s, "M/s");
+  line("matrix times all bands", 1e-9 * k.product_flop_per_s, "GFLOP/s");
+  line("matrix times one band, matrix read", 1e-9 * k.product_one_band_bytes_per_s, "GB/s");
+  line("  share of the triad", 100.0 * k.product_one_band_bytes_per_s / k.triad_bytes_per_s, "%");
+  line("time of all bands : time of one", k.bands_time_ratio, "");
+}
+
+void print(const std::vector<SolverWork>& solvers) {
+  fmt::print("\nPasses over the matrix to a relative bound\n{:>12}{:>16}{:>16}{:>22}\n", "bound",
+             "krylov", "gauss-seidel", "time, krylov = 1");
+  for (const SolverWork& w : solvers)
+    fmt::print("{:>12.0e}{:>16}{:>16}{:>22.2f}\n", w.relative_bound, w.krylov_passes,
+               w.gauss_seidel_passes, w.gauss_seidel_s / w.krylov_s);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App program{"Speed against accuracy on the measured Cornell Box"};
+  std::vector<std::size_t> elements{500, 1000, 2000, 4000};
+  std::size_t kernel_elements = 2000;
+  std::string json_path, reference = TRUEBOX_REFERENCE_DIR;
+  program.add_option("--elements", elements, "sizes of the fine grid")->delimiter(',');
+  program.add_option("--kernel-elements", kernel_elements, "size of the matrix for the kernels")
+      ->capture_default_str();
+  program.add_option("--json", json_path, "also write every number as JSON");
+  program.add_option("--reference", reference, "the folder of reference data");
+  CLI11_PARSE(program, argc, argv);
+
+  const auto scene =
+      truebox::read_scene(std::filesystem::path(reference) / "cornell_box" / "cornell_box.toml");
+  nlohmann::json json{{"threads", std::thread::hardware_concurrency()},
+                      {"compiler", __VERSION__},
+                      {"scene", "cornell_box"}};
+  fmt::print("Irradiance against independent path tracing, relative, in %\n"
+             "{:>9}{:>10}{:>9}{:>12}{:>12}{:>12}{:>12}{:>11}\n",
+             "elements", "solve / s", "ratio", "rms error", "max error", "its floor", "mean bound",
+             "covered");
+  double first_s = 0.0;
+  for (std::size_t count : elements) {
+    const Accuracy accuracy = measure_accuracy(scene, reference, count);
+    if (first_s == 0.0) first_s = accuracy.solve_s;
+    print(accuracy, first_s);
+    std::fflush(stdout);
+    json["accuracy"].push_back(as_json(accuracy));
+  }
+  const Kernels kernels = measure_kernels(scene, kernel_elements);
+  print(kernels);
+  json["kernels"] = as_json(kernels);
+  const auto solvers = measure_solvers(scene, kernel_elements, {1e-2, 1e-4, 1e-7, 1e-12});
+  print(solvers);
+  for (const SolverWork& work : solvers) json["solvers"].push_back(as_json(work));
+  if (!json_path.empty()) {
+    std::ofstream(json_path) << json.dump(2) << '\n';
+    fmt::print("\n{}\n", json_path);
+  }
+  return 0;
+}

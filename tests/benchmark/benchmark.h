@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <limits>
+#include <vector>
+
+#include "scene/scene.h"
+
+namespace truebox::benchmark {
+
+/// Wall-clock time of one call, s.
+template <class Work>
+double seconds(const Work& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// The shortest of a few calls, s: what the machine can do when nothing disturbs it.
+template <class Work>
+double best_seconds(const Work& work, int repetitions = 5) {
+  double best = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < repetitions; ++i) best = std::min(best, seconds(work));
+  return best;
+}
+
+/// A prediction of the Cornell Box against independent path tracing, relative to the irradiance,
+/// over all points and bands that receive light.
+struct Accuracy {
+  std::size_t elements = 0, coarse_elements = 0, compared = 0;
+  double solve_s = 0.0;
+  double probe_s = 0.0;           ///< all points, one thread
+  double rms_error = 0.0;
+  double max_error = 0.0;
+  double rms_standard_error = 0.0;  ///< of the path tracer: what rms_error cannot fall below
+  double mean_bound = 0.0;          ///< as the program states it
+  double covered = 0.0;             ///< share of errors within bound + 2 standard errors
+};
+Accuracy measure_accuracy(const Scene& scene, const std::filesystem::path& reference_dir,
+                          std::size_t elements);
+
+/// What the machine does, and what the program makes of it.
+struct Kernels {
+  std::size_t elements = 0, bands = 0;
+  double triad_bytes_per_s = 0.0;         ///< a = b + s c, three doubles counted
+  double occlusion_queries_per_s = 0.0;   ///< rays alone, between random elements
+  double rays_per_s = 0.0;                ///< rays of form factors, over the whole of their time
+  double pairs_per_s = 0.0;               ///< all pairs, occlusion included
+  double pairs_unoccluded_per_s = 0.0;    ///< the same scene as if nothing stood in between
+  double product_flop_per_s = 0.0;        ///< S times all bands
+  double product_one_band_bytes_per_s = 0.0;  ///< S times one band: S is read once
+  double bands_time_ratio = 0.0;          ///< time of all bands : time of one
+};
+Kernels measure_kernels(const Scene& scene, std::size_t elements);
+
+/// Work to a relative error bound by both methods on the same form factors.
+struct SolverWork {
+  double relative_bound = 0.0;
+  int krylov_passes = 0, gauss_seidel_passes = 0;  ///< over the matrix, all bands at once
+  double krylov_s = 0.0, gauss_seidel_s = 0.0;
+};
+std::vector<SolverWork> measure_solvers(const Scene& scene, std::size_t elements,
+                                        const std::vector<double>& relative_bounds);
+
+}  // namespace truebox::benchmark
