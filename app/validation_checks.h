@@ -11,7 +11,10 @@
 
 namespace truebox::app {
 
-/// Every group of checks, or the one named.
+/// Stands for every group that needs no prediction of the Cornell Box.
+inline constexpr const char* kClosedForms = "closed forms";
+
+/// Every group of checks, the one named, or kClosedForms.
 std::vector<AccuracyCheck> run_validation(const std::filesystem::path& reference_dir,
                                           const std::string& only, std::size_t elements,
                                           const Progress& progress);

@@ -8,6 +8,8 @@
 
 namespace truebox {
 
+class Prediction;
+
 /// A number of the program against the number it should be. `allowed` is what the two may differ by,
 /// in the quantity's unit, and `reason` says where that comes from.
 struct AccuracyCheck {
@@ -49,5 +51,8 @@ std::vector<AccuracyCheck> check_cie171(const std::filesystem::path& reference_d
 /// the program's own bound plus three of their standard errors.
 std::vector<AccuracyCheck> check_cornell_box_probes(const std::filesystem::path& reference_dir,
                                                     std::size_t elements);
+/// The same with a prediction of that scene at hand.
+std::vector<AccuracyCheck> check_cornell_box_probes(const std::filesystem::path& reference_dir,
+                                                    const Prediction& prediction);
 
 }  // namespace truebox

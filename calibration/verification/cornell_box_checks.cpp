@@ -11,13 +11,19 @@ namespace truebox {
 
 std::vector<AccuracyCheck> check_cornell_box_probes(const std::filesystem::path& reference_dir,
                                                     std::size_t elements) {
-  const TableFile points = read_table(reference_dir / "independent_renders" / "probe_points.csv");
-  const TableFile truth = read_table(reference_dir / "independent_renders" / "probe_irradiance.csv");
-  require_provenance(truth);
   const Scene scene = read_scene(reference_dir / "cornell_box" / "cornell_box.toml");
   PredictOptions options;
   options.elements = elements;
   const Prediction prediction(scene, options);
+  return check_cornell_box_probes(reference_dir, prediction);
+}
+
+std::vector<AccuracyCheck> check_cornell_box_probes(const std::filesystem::path& reference_dir,
+                                                    const Prediction& prediction) {
+  const Scene& scene = prediction.scene();
+  const TableFile points = read_table(reference_dir / "independent_renders" / "probe_points.csv");
+  const TableFile truth = read_table(reference_dir / "independent_renders" / "probe_irradiance.csv");
+  require_provenance(truth);
   std::vector<AccuracyCheck> checks;
   for (std::size_t i = 0; i < points.rows.size(); ++i) {
     Vec3 x, normal;
