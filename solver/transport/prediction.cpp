@@ -164,8 +164,29 @@ void Prediction::compare_grids() {
             compare(patch.centroid + 0.95 * (mesh.vertices[v] - patch.centroid));
         }
       });
+  share_bounds_at_contacts();
   for (Index k = 0; k < bands; ++k)
     indirect_bound_.col(k).array() += solver_bound(*fine_, k) + solver_bound(*coarse_, k);
+}
+
+// Where another surface stands on this one the light turns around its corners within an element:
+// by chance one of them may agree on both grids, so those that meet there share the largest.
+void Prediction::share_bounds_at_contacts() {
+  const PatchMesh& mesh = fine_->mesh;
+  std::vector<std::vector<std::uint32_t>> patches_at(mesh.vertices.size());
+  std::vector<char> is_contact(mesh.vertices.size(), 0);
+  for (std::uint32_t i = 0; i < mesh.size(); ++i)
+    for (std::uint32_t v : mesh.corners_of(mesh.patches[i])) {
+      if (fine_->usable[i]) patches_at[v].push_back(i);
+      else is_contact[v] = 1;
+    }
+  const BandMatrix own = indirect_bound_;
+  for (std::size_t v = 0; v < patches_at.size(); ++v) {
+    if (!is_contact[v]) continue;
+    for (std::uint32_t i : patches_at[v])
+      for (std::uint32_t j : patches_at[v])
+        indirect_bound_.row(i) = indirect_bound_.row(i).cwiseMax(own.row(j));
+  }
 }
 
 Eigen::VectorXd Prediction::expand(const Eigen::VectorXd& distinct) const {

@@ -75,6 +75,7 @@ class Prediction {
  private:
   void solve_grid(GridSolution& grid, double edge_m, int level, const PredictOptions& options);
   void compare_grids();
+  void share_bounds_at_contacts();
   BandMatrix indirect_from_surfaces(const GridSolution& grid, const Gather& gather,
                                     const SmoothField& smooth, const Vec3& point,
                                     const Vec3& normal, bool is_secondary) const;
