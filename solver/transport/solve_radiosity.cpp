@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "transport/band_product.h"
 
@@ -173,6 +174,7 @@ std::string SolveSummary::brief() const {
 SolveSummary solve_radiosity(const FormFactors& factors, const BandMatrix& rho,
                              const BandMatrix& source, const SolveOptions& options,
                              BandMatrix& radiosity, const Progress& progress) {
+  if (const std::string why = options.invalid(); !why.empty()) throw std::invalid_argument(why);
   return Solver(factors, rho, source, options, radiosity, progress).run();
 }
 

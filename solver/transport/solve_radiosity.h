@@ -35,6 +35,7 @@ struct SolveSummary {
 /// (diag(A / rho) - S) B = diag(A / rho) M, scaled by its diagonal, black elements eliminated.
 /// Exact only for Lambertian surfaces. A posteriori, with q = max rho * max row sum < 1:
 ///   ||B - B~||_inf <= ||M + diag(rho) F B~ - B~||_inf / (1 - q).
+/// Throws std::invalid_argument if options.invalid().
 /// Sources: Goral et al. (1984); Cohen & Wallace (1993), ch. 5; Neumann (1994).
 SolveSummary solve_radiosity(const FormFactors& factors, const BandMatrix& rho,
                              const BandMatrix& source, const SolveOptions& options,
