@@ -90,7 +90,8 @@ std::string describe(const Predicted& p) {
 
 std::vector<SurfaceMean> surface_means(const Prediction& prediction) {
   const PatchMesh& mesh = prediction.fine().mesh;
-  const BandMatrix radiosity = prediction.radiosity(), bound = prediction.radiosity_bound();
+  const BandMatrix radiosity = prediction.radiosity();
+  const BandMatrix bound = prediction.surface_irradiance_bound();
   const BandMatrix irradiance = prediction.irradiance();
   std::vector<SurfaceMean> means;
   for (const Surface& surface : prediction.scene().surfaces) {
@@ -104,13 +105,17 @@ std::vector<SurfaceMean> surface_means(const Prediction& prediction) {
     const auto row = static_cast<Eigen::Index>(i);
     mean.area_m2 += area;
     mean.radiosity += area * radiosity.row(row).transpose();
-    mean.radiosity_bound += area * bound.row(row).transpose();
     mean.irradiance += area * irradiance.row(row).transpose();
+  }
+  for (std::size_t k = 0; k < means.size(); ++k) {
+    const auto& rho = prediction.scene().material_of(prediction.scene().surfaces[k]).reflectance;
+    const Eigen::Map<const Eigen::VectorXd> reflectance(rho.values.data(), bound.cols());
+    means[k].radiosity_bound =
+        reflectance.cwiseProduct(bound.row(static_cast<Eigen::Index>(k)).transpose());
   }
   std::erase_if(means, [](const SurfaceMean& m) { return m.area_m2 == 0.0; });
   for (SurfaceMean& mean : means) {
     mean.radiosity /= mean.area_m2;
-    mean.radiosity_bound /= mean.area_m2;
     mean.irradiance /= mean.area_m2;
   }
   return means;

@@ -42,8 +42,7 @@ Progress terminal_progress(bool quiet = false);
 /// What the solve did, as text for a person: elements, form factors, closure, solver, time.
 std::string describe(const Predicted& predicted);
 
-/// For each band the largest bound of any surface's mean radiosity relative to that mean, and more;
-/// written by solve and demo.
+/// Means over a surface, elements that lie under another one left out; W m^-2 nm^-1 in each band.
 struct SurfaceMean {
   std::string surface;
   double area_m2 = 0.0;

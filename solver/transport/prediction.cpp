@@ -145,14 +145,16 @@ void Prediction::compare_grids() {
     factor[k] = 1.0 / (std::exp2(edge_exponent(rho)) - 1.0);
   }
   indirect_bound_ = BandMatrix::Zero(fine_->indirect.rows(), bands);
+  parent_.resize(mesh.size());
   tbb::parallel_for(
       tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.size())),
       [&](const auto& range) {
         Eigen::VectorXd a(bands), b(bands);
         for (std::uint32_t i = range.begin(); i < range.end(); ++i) {
-          if (!fine_->usable[i]) continue;
           const Patch& patch = mesh.patches[i];
           const std::uint32_t parent = smooth_coarse_->find_patch(patch.piece, patch.centroid);
+          parent_[i] = parent;
+          if (!fine_->usable[i]) continue;
           const auto compare = [&](const Vec3& point) {
             smooth_fine_->evaluate(i, point, a);
             smooth_coarse_->evaluate(parent, point, b);
@@ -274,6 +276,36 @@ BandMatrix Prediction::irradiance() const {
   BandMatrix all(fine_->direct.rows(), static_cast<Index>(scene_->bands.size()));
   for (Index i = 0; i < all.rows(); ++i)
     all.row(i) = expand((fine_->direct.row(i) + fine_->indirect.row(i)).transpose()).transpose();
+  return all;
+}
+
+BandMatrix Prediction::surface_irradiance_bound() const {
+  const PatchMesh& mesh = fine_->mesh;
+  const Index bands = fine_->indirect.cols();
+  const auto surfaces = static_cast<Index>(scene_->surfaces.size());
+  BandMatrix children = BandMatrix::Zero(coarse_->indirect.rows(), bands);
+  Eigen::VectorXd children_area = Eigen::VectorXd::Zero(coarse_->indirect.rows());
+  Eigen::VectorXd area = Eigen::VectorXd::Zero(surfaces);
+  BandMatrix sum = BandMatrix::Zero(surfaces, bands);
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    if (!fine_->usable[i]) continue;
+    const Patch& patch = mesh.patches[i];
+    children.row(parent_[i]) += patch.area_m2 * fine_->indirect.row(static_cast<Index>(i));
+    children_area[parent_[i]] += patch.area_m2;
+  }
+  for (std::size_t p = 0; p < coarse_->mesh.size(); ++p) {
+    const auto row = static_cast<Index>(p);
+    const auto surface = static_cast<Index>(coarse_->mesh.surface_of(coarse_->mesh.patches[p]));
+    sum.row(surface) += (children.row(row) - children_area[row] * coarse_->indirect.row(row)).cwiseAbs();
+    area[surface] += children_area[row];
+  }
+  BandMatrix all = BandMatrix::Zero(surfaces, static_cast<Index>(scene_->bands.size()));
+  for (Index s = 0; s < surfaces; ++s) {
+    if (area[s] == 0.0) continue;
+    Eigen::VectorXd bound = sum.row(s).transpose() / area[s];
+    for (Index k = 0; k < bands; ++k) bound[k] += solver_bound(*fine_, k) + solver_bound(*coarse_, k);
+    all.row(s) = expand(bound).transpose();
+  }
   return all;
 }
 

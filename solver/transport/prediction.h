@@ -71,6 +71,10 @@ class Prediction {
   BandMatrix radiosity_bound() const;
   /// Mean irradiance of each element, elements x bands of the scene.
   BandMatrix irradiance() const;
+  /// Bound of the mean irradiance of each surface, surfaces x bands: means converge faster than
+  /// values at points. Differences between the grids are taken element by element (those of the
+  /// coarse grid), p = 1, and added without sign.
+  BandMatrix surface_irradiance_bound() const;
 
  private:
   void solve_grid(GridSolution& grid, double edge_m, int level, const PredictOptions& options);
@@ -89,7 +93,8 @@ class Prediction {
   std::unique_ptr<Visibility> visibility_;
   std::unique_ptr<Gather> gather_fine_, gather_coarse_;
   std::unique_ptr<SmoothField> smooth_fine_, smooth_coarse_;
-  BandMatrix indirect_bound_;  // elements of the fine grid x distinct bands
+  std::vector<std::uint32_t> parent_;  // fine element -> coarse element
+  BandMatrix indirect_bound_;          // elements of the fine grid x distinct bands
 };
 
 }  // namespace truebox
