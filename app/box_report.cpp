@@ -176,7 +176,7 @@ Figure wall_spectra(const Predicted& predicted) {
 
 }  // namespace
 
-BoxReport box_report(const Predicted& predicted, const RenderedImage& image,
+ReportPart box_report(const Predicted& predicted, const RenderedImage& image,
                      const std::vector<AccuracyCheck>& accuracy,
                      const std::filesystem::path& reference_dir) {
   const auto folder = reference_dir / "independent_renders";
@@ -188,7 +188,7 @@ BoxReport box_report(const Predicted& predicted, const RenderedImage& image,
   const RenderAgreement agreement =
       render_agreement(image.radiance, image.error_bound, other.radiance, other.standard_error);
 
-  BoxReport report;
+  ReportPart report;
   std::size_t failed = 0;
   for (const AccuracyCheck& c : accuracy) failed += !c.passed();
   report.checks.push_back({"closed forms and certified values: failed checks",

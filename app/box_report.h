@@ -4,24 +4,17 @@
 #include <filesystem>
 #include <vector>
 
-#include "document/report.h"
 #include "prediction_options.h"
+#include "report_part.h"
 #include "sensor/render.h"
 #include "verification/accuracy_check.h"
 #include "verification/render_agreement.h"
 
 namespace truebox::app {
 
-/// What a report says of the predicted Cornell Box and of the program's certified checks.
-struct BoxReport {
-  std::vector<Check> checks;
-  std::vector<Section> sections;
-  std::vector<Setting> provenance;
-  std::string sentence;  ///< for the verdict
-};
-
+/// The predicted Cornell Box and the program's certified checks: pictures, bound, z scores, digits.
 /// `image` is the prediction through the camera of the independent render in `reference_dir`.
-BoxReport box_report(const Predicted& predicted, const RenderedImage& image,
+ReportPart box_report(const Predicted& predicted, const RenderedImage& image,
                      const std::vector<AccuracyCheck>& accuracy,
                      const std::filesystem::path& reference_dir);
 

@@ -230,9 +230,9 @@ Paragraph instrument_text(const ChartMeasurement& m) {
 
 }  // namespace
 
-ChartReport chart_report(const ChartMeasurement& m, const Requirements& plan,
+ReportPart chart_report(const ChartMeasurement& m, const Requirements& plan,
                          const std::filesystem::path& colour_dir) {
-  ChartReport report;
+  ReportPart report;
   report.checks = make_checks(m);
   const ColourPipeline colour;
 

@@ -74,10 +74,10 @@ int demo(const DemoArguments& a) {
   }
 
   fmt::print("4/4  the report\n");
-  const BoxReport box = box_report(*predicted, image, accuracy, reference);
+  const ReportPart box = box_report(*predicted, image, accuracy, reference);
   const Requirements chart_plan =
       requirements(read_scene(reference / "llanos_narrowband" / "chart.toml"));
-  const ChartReport chart = chart_report(measurement, chart_plan, reference / "colour");
+  const ReportPart chart = chart_report(measurement, chart_plan, reference / "colour");
   Report report;
   report.title = "Is this simulation of light true?";
   report.subtitle =
