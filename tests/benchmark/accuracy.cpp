@@ -15,7 +15,8 @@ struct Probe {
   Vec3 point_m, normal;
 };
 
-std::map<std::string, Probe> read_probes(const std::filesystem::path& path, double metres_per_unit) {
+std::map<std::string, Probe> read_probes(const std::filesystem::path& path,
+                                         double metres_per_unit) {
   const TableFile table = read_table(path);
   std::map<std::string, Probe> probes;
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
@@ -60,8 +61,7 @@ Accuracy measure_accuracy(const Scene& scene, const std::filesystem::path& refer
   for (std::size_t row = 0; row < truth.rows.size(); ++row) {
     const double expected = truth.number(row, 2), standard_error = truth.number(row, 3);
     if (expected <= 0.0) continue;
-    const auto band =
-        static_cast<Eigen::Index>(nearest_band(scene.bands, truth.number(row, 1)));
+    const auto band = static_cast<Eigen::Index>(nearest_band(scene.bands, truth.number(row, 1)));
     const BoundedIrradiance& answer = answers.at(truth.rows[row][0]);
     const double difference = std::abs(answer.value[band] - expected);
     const double bound = answer.error_bound[band];

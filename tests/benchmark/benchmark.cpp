@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Speed against accuracy on the measured Cornell Box: a table for people, one JSON for plots.
 // Times depend on the machine and on what else it does; compare only within one run.
+#include "benchmark.h"
+
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -9,7 +11,6 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "benchmark.h"
 #include "scene/scene_file.h"
 
 namespace {
@@ -100,10 +101,11 @@ int main(int argc, char** argv) {
   nlohmann::json json{{"threads", std::thread::hardware_concurrency()},
                       {"compiler", __VERSION__},
                       {"scene", "cornell_box"}};
-  fmt::print("Irradiance against independent path tracing, relative, in %\n"
-             "{:>9}{:>10}{:>9}{:>12}{:>12}{:>12}{:>12}{:>11}\n",
-             "elements", "solve / s", "ratio", "rms error", "max error", "its floor", "mean bound",
-             "covered");
+  fmt::print(
+      "Irradiance against independent path tracing, relative, in %\n"
+      "{:>9}{:>10}{:>9}{:>12}{:>12}{:>12}{:>12}{:>11}\n",
+      "elements", "solve / s", "ratio", "rms error", "max error", "its floor", "mean bound",
+      "covered");
   double first_s = 0.0;
   for (std::size_t count : elements) {
     const Accuracy accuracy = measure_accuracy(scene, reference, count);

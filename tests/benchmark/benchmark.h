@@ -31,7 +31,7 @@ double best_seconds(const Work& work, int repetitions = 5) {
 struct Accuracy {
   std::size_t elements = 0, coarse_elements = 0, compared = 0;
   double solve_s = 0.0;
-  double probe_s = 0.0;           ///< all points, one thread
+  double probe_s = 0.0;  ///< all points, one thread
   double rms_error = 0.0;
   double max_error = 0.0;
   double rms_standard_error = 0.0;  ///< of the path tracer: what rms_error cannot fall below
@@ -44,14 +44,14 @@ Accuracy measure_accuracy(const Scene& scene, const std::filesystem::path& refer
 /// What the machine does, and what the program makes of it.
 struct Kernels {
   std::size_t elements = 0, bands = 0;
-  double triad_bytes_per_s = 0.0;         ///< a = b + s c, three doubles counted
-  double occlusion_queries_per_s = 0.0;   ///< rays alone, between random elements
-  double rays_per_s = 0.0;                ///< rays of form factors, over the whole of their time
-  double pairs_per_s = 0.0;               ///< all pairs, occlusion included
-  double pairs_unoccluded_per_s = 0.0;    ///< the same scene as if nothing stood in between
-  double product_flop_per_s = 0.0;        ///< S times all bands
+  double triad_bytes_per_s = 0.0;        ///< a = b + s c, three doubles counted
+  double occlusion_queries_per_s = 0.0;  ///< rays alone, between random elements
+  double rays_per_s = 0.0;               ///< rays of form factors, over the whole of their time
+  double pairs_per_s = 0.0;              ///< all pairs, occlusion included
+  double pairs_unoccluded_per_s = 0.0;   ///< the same scene as if nothing stood in between
+  double product_flop_per_s = 0.0;       ///< S times all bands
   double product_one_band_bytes_per_s = 0.0;  ///< S times one band: S is read once
-  double bands_time_ratio = 0.0;          ///< time of all bands : time of one
+  double bands_time_ratio = 0.0;              ///< time of all bands : time of one
 };
 Kernels measure_kernels(const Scene& scene, std::size_t elements);
 

@@ -31,18 +31,20 @@ double occlusion_queries_per_s(const PatchMesh& mesh, const Visibility& visibili
   std::vector<std::pair<std::uint32_t, std::uint32_t>> ends(kRays);
   for (auto& [from, to] : ends) from = pick(random), to = pick(random);
   std::atomic<std::size_t> hidden{0};
-  const double time = best_seconds([&] {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, kRays, 4096), [&](const auto& range) {
-      std::size_t count = 0;
-      for (std::size_t i = range.begin(); i < range.end(); ++i) {
-        const Patch& from = mesh.patches[ends[i].first];
-        const Patch& to = mesh.patches[ends[i].second];
-        count += visibility.occluded(from.centroid, mesh.plane_of(from).normal, to.centroid,
-                                     mesh.plane_of(to).normal);
-      }
-      hidden += count;
-    });
-  }, 3);
+  const double time = best_seconds(
+      [&] {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, kRays, 4096), [&](const auto& range) {
+          std::size_t count = 0;
+          for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            const Patch& from = mesh.patches[ends[i].first];
+            const Patch& to = mesh.patches[ends[i].second];
+            count += visibility.occluded(from.centroid, mesh.plane_of(from).normal, to.centroid,
+                                         mesh.plane_of(to).normal);
+          }
+          hidden += count;
+        });
+      },
+      3);
   return kRays / time;
 }
 
@@ -58,8 +60,8 @@ struct BoxProblem {
     rho.resize(factors.size(), bands);
     source.resize(factors.size(), bands);
     for (Eigen::Index i = 0; i < rho.rows(); ++i) {
-      const Material& material =
-          scene.material_of(scene.surfaces[mesh.surface_of(mesh.patches[static_cast<std::size_t>(i)])]);
+      const Material& material = scene.material_of(
+          scene.surfaces[mesh.surface_of(mesh.patches[static_cast<std::size_t>(i)])]);
       rho.row(i) = Eigen::Map<const Eigen::RowVectorXd>(material.reflectance.values.data(), bands);
       source.row(i) = Eigen::Map<const Eigen::RowVectorXd>(material.exitance.values.data(), bands);
     }
@@ -111,9 +113,8 @@ std::vector<SolverWork> measure_solvers(const Scene& scene, std::size_t elements
       options.method = method;
       BandMatrix radiosity;
       SolveSummary summary;
-      const double time = seconds([&] {
-        summary = solve_radiosity(box.factors, box.rho, box.source, options, radiosity);
-      });
+      const double time = seconds(
+          [&] { summary = solve_radiosity(box.factors, box.rho, box.source, options, radiosity); });
       passes = summary.outcome == SolveOutcome::converged ? summary.matrix_passes : -1;
       return time;
     };
