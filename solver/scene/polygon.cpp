@@ -68,8 +68,24 @@ void clip(std::span<const Vec3> polygon, const Plane& plane, double tolerance_m,
 
 namespace {
 
+// Whether two edges that are no neighbours cross.
+bool crosses_itself(const Polygon& outline, const Vec3& normal) {
+  const std::size_t n = outline.size();
+  const auto side = [&](const Vec3& a, const Vec3& b, const Vec3& p) {
+    return normal.dot((b - a).cross(p - a));
+  };
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = i + 2; j < n; ++j) {
+      if (i == 0 && j == n - 1) continue;
+      const Vec3 &a = outline[i], &b = outline[i + 1], &c = outline[j], &d = outline[(j + 1) % n];
+      if (side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0) return true;
+    }
+  return false;
+}
+
 std::vector<Polygon> triangulate(const Polygon& outline) {
   const Vec3 normal = area_vector(outline).normalized();
+  if (crosses_itself(outline, normal)) return {};
   const double tolerance = 1e-12 * diameter_m(outline);
   std::vector<std::size_t> ring(outline.size());
   for (std::size_t i = 0; i < ring.size(); ++i) ring[i] = i;
@@ -132,6 +148,7 @@ std::vector<Polygon> convex_pieces(const Polygon& outline, const std::vector<Pol
     if (area_vector(hole).dot(normal) < 0.0) std::reverse(hole.begin(), hole.end());
     const auto parts =
         is_convex(hole, tolerance) ? std::vector<Polygon>{hole} : triangulate(hole);
+    if (parts.empty()) return {};
     for (const Polygon& part : parts) pieces = subtract(pieces, part, normal, tolerance);
   }
   return pieces;

@@ -42,7 +42,7 @@ bool is_convex(std::span<const Vec3> polygon, double tolerance_m);
 void clip(std::span<const Vec3> polygon, const Plane& plane, double tolerance_m, Polygon& kept);
 
 /// Convex pieces that cover a simple polygon without its holes, each with the polygon's normal.
-/// Empty if the outline crosses itself. Ear clipping for an outline that is not convex.
+/// Empty if the outline or a hole crosses itself. Ear clipping for an outline that is not convex.
 std::vector<Polygon> convex_pieces(const Polygon& outline, const std::vector<Polygon>& holes);
 
 }  // namespace truebox
