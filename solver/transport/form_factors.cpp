@@ -218,6 +218,26 @@ class Builder {
     rays_ += rays;
   }
 
+  // The underside of a block that stands on a floor: a surface of opposite normal at its centroid.
+  bool lies_on_a_back(std::size_t i) const {
+    const Vec3& normal = mesh_.plane_of(mesh_.patches[i]).normal;
+    const Vec3& centre = mesh_.patches[i].centroid;
+    for (std::uint32_t b : blockers_) {
+      const Piece& piece = mesh_.pieces[b];
+      if (std::abs(piece.plane.distance_m(centre)) > tolerance_m_ ||
+          piece.plane.normal.dot(normal) > -1.0 + 1e-9)
+        continue;
+      bool inside = true;
+      const std::size_t n = piece.polygon.size();
+      for (std::size_t k = 0; k < n && inside; ++k) {
+        const Vec3& a = piece.polygon[k];
+        inside = piece.plane.normal.cross(piece.polygon[(k + 1) % n] - a).dot(centre - a) > 0.0;
+      }
+      if (inside) return true;
+    }
+    return false;
+  }
+
   // A patch under a block sees nothing: every ray from it meets the back of a surface at once.
   void mark_buried(FormFactors& factors) const {
     factors.usable.assign(mesh_.size(), 1);
@@ -227,7 +247,7 @@ class Builder {
       const Vec3& normal = mesh_.plane_of(mesh_.patches[i]).normal;
       const auto hit = visibility_.first_hit(
           mesh_.patches[i].centroid + visibility_.offset_m() * normal, normal, true);
-      if (!hit || hit->front) continue;
+      if (hit ? hit->front : !lies_on_a_back(i)) continue;
       factors.usable[i] = 0;
       ++factors.summary.buried_patches;
       factors.exchange_area_m2.col(row).setZero();
