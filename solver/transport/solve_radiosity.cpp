@@ -48,6 +48,11 @@ class Solver {
 
   // Updates bound and history from a true residual; true when every band meets the request.
   bool good_enough(const BandMatrix& r) {
+    if (!r.allFinite()) {  // maxCoeff may pass over a NaN
+      summary_.outcome = SolveOutcome::diverged;
+      summary_.error_bound.setConstant(std::numeric_limits<double>::infinity());
+      return false;
+    }
     double worst = 0.0, worst_bound = 0.0;
     for (Index band = 0; band < r.cols(); ++band) {
       const double q = rho_.col(band).maxCoeff() * std::max(1.0, factors_.summary.row_sum_max);
@@ -117,6 +122,7 @@ class Solver {
       summary_.outcome = SolveOutcome::converged;
       return;
     }
+    if (summary_.outcome == SolveOutcome::diverged) return;
     while (summary_.iterations < options_.iteration_limit) {
       BandMatrix ap = band_product(factors_.exchange_area_m2, p);
       ++summary_.matrix_passes;
