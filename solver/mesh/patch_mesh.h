@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "mesh/contact_lines.h"
 #include "scene/scene.h"
 
 namespace truebox {
@@ -26,6 +27,7 @@ struct Piece {
   double diameter_m = 0.0;
   std::uint32_t first_patch = 0;
   std::uint32_t patch_count = 0;
+  std::vector<ContactLine> contacts;  ///< where other surfaces touch: radiosity may jump across
 };
 
 /// Elements of all surfaces. Vertices are shared within a piece, never between pieces: radiosity

@@ -16,8 +16,14 @@ using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
 Edge edge_of(std::uint32_t a, std::uint32_t b) { return {std::min(a, b), std::max(a, b)}; }
 
-// Which elements share an edge or a vertex. A contact line shows as an edge between a usable and an
-// unusable element, so that crossing only usable elements keeps both sides of a block apart.
+bool lies_on(const Vec3& point, const ContactLine& line, double tolerance_m) {
+  const Vec3 along = line.to - line.from;
+  const double t = std::clamp(along.dot(point - line.from) / along.squaredNorm(), 0.0, 1.0);
+  return (point - line.from - t * along).norm() < tolerance_m;
+}
+
+// Which elements share an edge or a vertex. Elements on two sides of a contact line share neither:
+// a block, or a wall too thin to bury anything, keeps its two sides apart.
 struct Topology {
   std::vector<std::vector<std::uint32_t>> patches_at;  // vertex -> elements
   std::map<Edge, std::array<std::uint32_t, 2>> patches_along;
@@ -32,6 +38,13 @@ struct Topology {
             edge_of(corners[k], corners[(k + 1) % corners.size()]), std::array{p, kNone});
         if (!is_new) it->second[1] = p;
       }
+    }
+    for (auto& [edge, sides] : patches_along) {
+      const Piece& piece = mesh.pieces[mesh.patches[sides[0]].piece];
+      for (const ContactLine& line : piece.contacts)
+        if (lies_on(mesh.vertices[edge.first], line, 1e-6 * piece.diameter_m) &&
+            lies_on(mesh.vertices[edge.second], line, 1e-6 * piece.diameter_m))
+          sides = {kNone, kNone};
     }
   }
 };
