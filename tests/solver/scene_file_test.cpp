@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/scene_file.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "radiometry/input_error.h"
+
+namespace truebox {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr char kGood[] = R"(length_unit = "cm"
+
+[bands]
+from_nm = 400
+to_nm = 700
+step_nm = 100
+
+[materials.white]
+reflectance = { nm = [400, 700], value = [0.2, 0.8] }
+
+[materials.lamp]
+reflectance = 0.5
+exitance = { file = "scene_file_test_lamp.csv", column = "power" }
+
+[[surfaces]]
+name = "floor"
+material = "white"
+vertices = [[0, 0, 0], [100, 0, 0], [100, 100, 0], [0, 100, 0]]
+holes = [[[20, 20, 0], [40, 20, 0], [40, 40, 0], [20, 40, 0]]]
+
+[[surfaces]]
+name = "lamp"
+material = "lamp"
+vertices = [[0, 0, 100], [0, 100, 100], [100, 100, 101], [100, 0, 100]]
+two_sided = true
+
+[[openings]]
+name = "window"
+vertices = [[0, 0, 0], [0, 100, 0], [0, 100, 100]]
+
+[cameras.front]
+position = [50, 50, 50]
+direction = [0, 0, -1]
+up = [0, 1, 0]
+focal_length_mm = 35
+film_mm = [25, 20]
+pixels = [10, 8]
+)";
+
+std::string write(const std::string& name, const std::string& text) {
+  const std::string path = testing::TempDir() + name;
+  std::ofstream(path) << text;
+  return path;
+}
+
+void write_lamp() {
+  write("scene_file_test_lamp.csv", "# unit: W\nnm,power,negative\n400,1,1\n700,4,-1\n");
+  write("scene_file_test_unsorted.csv", "# unit: W\nnm,power\n700,4\n400,1\n");
+}
+
+int line_of(const std::string& text, const std::string& needle) {
+  return 1 + static_cast<int>(std::count(
+                 text.begin(), text.begin() + static_cast<long>(text.find(needle)), '\n'));
+}
+
+TEST(SceneFile, ReadsAGoodScene) {
+  write_lamp();
+  const Scene scene = read_scene(write("scene_file_test_good.toml", kGood));
+  EXPECT_EQ(scene.metres_per_unit, 0.01);
+  ASSERT_EQ(scene.bands.size(), 4u);
+  ASSERT_EQ(scene.surfaces.size(), 3u);
+  double area = 0.0;
+  for (const Polygon& piece : scene.surfaces[0].pieces) area += area_vector(piece).norm();
+  EXPECT_NEAR(area, 1.0 - 0.04, 1e-14) << "m^2";
+  EXPECT_EQ(scene.surfaces[1].pieces.size(), 4u) << "a bent quad is two triangles, two-sided four";
+  EXPECT_TRUE(scene.surfaces[2].is_opening) << "openings come last";
+  const Material& white = scene.material_of(scene.surfaces[0]);
+  EXPECT_NEAR(white.reflectance[1], 0.4, 1e-14);
+  EXPECT_FALSE(white.emits());
+  const Material& lamp = scene.material_of(scene.surfaces[1]);
+  EXPECT_NEAR(lamp.exitance[2], 3.0, 1e-14);
+  EXPECT_TRUE(lamp.emits());
+  const CameraDescription& camera = scene.cameras.at("front");
+  EXPECT_NEAR(camera.position_m.x(), 0.5, 1e-15);
+  EXPECT_NEAR(camera.film_m[1], 0.02, 1e-15);
+  EXPECT_EQ(camera.pixels[1], 8);
+}
+
+TEST(SceneFile, ReadsThePublishedCornellBox) {
+  const Scene scene =
+      read_scene(std::string(TRUEBOX_REFERENCE_DIR) + "/cornell_box/cornell_box.toml");
+  EXPECT_EQ(scene.bands.size(), 76u);
+  EXPECT_EQ(scene.surfaces.size(), 17u);
+  EXPECT_NEAR(scene.surfaces[0].pieces[0][0].x(), 0.5528, 1e-15);
+}
+
+struct Mistake {
+  std::string name;
+  std::string from, to;      // the first `from` is replaced
+  std::string at;            // text that stands in the line to be named; empty: no line
+  std::vector<std::string> says;
+};
+
+class SceneMistake : public testing::TestWithParam<Mistake> {};
+
+TEST_P(SceneMistake, NamesFileLineExpectedAndFound) {
+  const Mistake& mistake = GetParam();
+  write_lamp();
+  std::string text = kGood;
+  const std::size_t at = text.find(mistake.from);
+  ASSERT_NE(at, std::string::npos);
+  text.replace(at, mistake.from.size(), mistake.to);
+  const std::string path = write("scene_file_test_" + mistake.name + ".toml", text);
+  try {
+    read_scene(path);
+    FAIL() << mistake.name << " was accepted";
+  } catch (const InputError& error) {
+    for (const std::string& words : mistake.says) EXPECT_THAT(error.what(), HasSubstr(words));
+    EXPECT_THAT(error.what(), HasSubstr("expected"));
+    EXPECT_THAT(error.what(), HasSubstr("found"));
+    if (mistake.at.empty()) return;
+    EXPECT_EQ(error.file(), path);
+    EXPECT_EQ(error.line(), line_of(text, mistake.at)) << error.what();
+  }
+}
+
+const std::string kFloor = "vertices = [[0, 0, 0], [100, 0, 0], [100, 100, 0], [0, 100, 0]]";
+
+INSTANTIATE_TEST_SUITE_P(
+    Each, SceneMistake,
+    testing::Values(
+        Mistake{"unknown_key", "two_sided", "two_side", "two_side", {"one of the keys", "two_side"}},
+        Mistake{"unknown_top_key", "[cameras.front]", "[camera.front]", "[camera.front]",
+                {"cameras", "\"camera\""}},
+        Mistake{"unknown_material", "material = \"white\"", "material = \"wite\"", "wite",
+                {"white", "lamp", "\"wite\""}},
+        Mistake{"perfect_mirror", "reflectance = 0.5", "reflectance = 1.0", "reflectance = 1.0",
+                {"reflectance < 1", "1.0"}},
+        Mistake{"negative_reflectance", "[0.2, 0.8]", "[-0.2, 0.8]", "[-0.2, 0.8]",
+                {"0 <= reflectance", "-0.2"}},
+        Mistake{"negative_emission", "column = \"power\"", "column = \"negative\"", "exitance",
+                {"exitance >= 0", "-0.3"}},
+        Mistake{"nan", "reflectance = 0.5", "reflectance = nan", "reflectance = nan", {"nan"}},
+        Mistake{"infinite_vertex", kFloor, "vertices = [[0, 0, 0], [inf, 0, 0], [1, 1, 0]]",
+                "[inf", {"a finite number", "inf"}},
+        Mistake{"unsorted_inline", "nm = [400, 700]", "nm = [700, 400]", "nm = [700",
+                {"sorted"}},
+        Mistake{"unequal_lengths", "[0.2, 0.8]", "[0.2, 0.5, 0.8]", "[0.2, 0.5", {"as many values"}},
+        Mistake{"unsorted_file", "scene_file_test_lamp.csv", "scene_file_test_unsorted.csv", "",
+                {"scene_file_test_unsorted.csv:4", "400"}},
+        Mistake{"missing_csv", "scene_file_test_lamp.csv", "nowhere.csv", "", {"nowhere.csv"}},
+        Mistake{"missing_column", "column = \"power\"", "column = \"colour\"", "",
+                {"power", "colour"}},
+        Mistake{"bent_pentagon", kFloor + "\nholes",
+                "vertices = [[0, 0, 0], [100, 0, 0], [100, 100, 1], [50, 120, 0], [0, 100, 0]]\n#",
+                "[50, 120, 0]", {"planar", "bent"}},
+        Mistake{"bent_with_hole", "[100, 100, 0], [0, 100, 0]", "[100, 100, 5], [0, 100, 0]",
+                "[100, 100, 5]", {"planar", "bent"}},
+        Mistake{"hole_off_the_plane", "[40, 40, 0]", "[40, 40, 3]", "[40, 40, 3]",
+                {"holes in the plane"}},
+        Mistake{"zero_area", kFloor, "vertices = [[0, 0, 0], [50, 0, 0], [100, 0, 0]]",
+                "[50, 0, 0]", {"an area"}},
+        Mistake{"two_vertices", kFloor, "vertices = [[0, 0, 0], [50, 0, 0]]", "[50, 0, 0]",
+                {"at least three"}},
+        Mistake{"crossing_outline", kFloor + "\nholes",
+                "vertices = [[0, 0, 0], [2, 0, 0], [0, 1, 0], [3, 2, 0]]\n#", "[0, 1, 0]",
+                {"does not cross itself"}},
+        Mistake{"bad_unit", "\"cm\"", "\"ft\"", "\"ft\"", {"mm", "ft"}},
+        Mistake{"unit_as_number", "\"cm\"", "0.01", "length_unit", {"a unit in quotes", "0.01"}},
+        Mistake{"duplicate_name", "name = \"lamp\"", "name = \"floor\"", "name = \"floor\"\nmaterial = \"lamp\"",
+                {"used once", "floor"}},
+        Mistake{"spectrum_without_bands", "[bands]\nfrom_nm = 400\nto_nm = 700\nstep_nm = 100", "",
+                "exitance", {"[bands]"}},
+        Mistake{"zero_step", "step_nm = 100", "step_nm = 0", "[bands]", {"usable bands"}},
+        Mistake{"missing_step", "step_nm = 100", "", "[bands]", {"step_nm"}},
+        Mistake{"text_as_reflectance", "reflectance = 0.5", "reflectance = \"half\"", "\"half\"",
+                {"a reflectance", "half"}},
+        Mistake{"flag_as_reflectance", "reflectance = 0.5", "reflectance = true", "= true\nexit",
+                {"true"}},
+        Mistake{"two_coordinates", "[100, 0, 0]", "[100, 0]", "[100, 0]", {"2 numbers"}},
+        Mistake{"two_sided_as_number", "two_sided = true", "two_sided = 1", "two_sided = 1",
+                {"true or false"}},
+        Mistake{"no_pixels", "pixels = [10, 8]", "pixels = [0, 8]", "[0, 8]", {"1 to 32768"}},
+        Mistake{"parallel_up", "up = [0, 1, 0]", "up = [0, 0, 2]", "[cameras.front]", {"parallel"}},
+        Mistake{"no_focal_length", "focal_length_mm = 35", "focal_length_mm = 0",
+                "focal_length_mm", {"positive focal length"}},
+        Mistake{"syntax", "name = \"lamp\"", "name = \"lamp", "name = \"lamp", {"valid TOML"}}),
+    [](const auto& mistake) { return mistake.param.name; });
+
+TEST(SceneFile, NamesAMissingFile) {
+  try {
+    read_scene(testing::TempDir() + "no_such_scene.toml");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no_such_scene.toml"));
+    EXPECT_THAT(error.what(), HasSubstr("no such file"));
+  }
+}
+
+}  // namespace
+}  // namespace truebox
