@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "verification/accuracy_check.h"
+
+namespace truebox {
+namespace {
+
+struct Group {
+  std::string name;
+  std::function<std::vector<AccuracyCheck>(const std::filesystem::path&)> check;
+  std::size_t count;  // at least
+  double digits;      // at least, in every check
+};
+
+class CertifiedValues : public testing::TestWithParam<Group> {};
+
+TEST_P(CertifiedValues, AreReproducedInDigits) {
+  const auto checks = GetParam().check(TRUEBOX_REFERENCE_DIR);
+  ASSERT_GE(checks.size(), GetParam().count);
+  double fewest = 16.0;
+  for (const AccuracyCheck& c : checks) {
+    EXPECT_TRUE(c.passed()) << c.name << ": " << c.computed << ", certified " << c.certified
+                            << ", allowed " << c.allowed << " (" << c.reason << ")";
+    EXPECT_EQ(c.group, GetParam().name);
+    fewest = std::min(fewest, matching_digits(c.computed, c.certified));
+  }
+  EXPECT_GE(fewest, GetParam().digits);
+  std::printf("%s: %zu checks, fewest digits %.1f\n", GetParam().name.c_str(), checks.size(), fewest);
+}
+
+// Fewest digits: the furnace at rho = 1 - 1e-6 amplifies rounding by 1e6 twice over; plates with
+// gap 1e-8 lose 2e-8 of their view, amplified by 1 / (1 - rho); probes carry Monte Carlo noise.
+INSTANTIATE_TEST_SUITE_P(
+    Groups, CertifiedValues,
+    testing::Values(Group{"viewfactors", check_view_factors, 20, 9.0},
+                    Group{"furnace", check_furnace, 10, 9.0},
+                    Group{"plates", check_infinite_plates, 6, 5.0},
+                    Group{"cube", check_ceiling_lit_cube, 12, 10.0},
+                    Group{"cie171", check_cie171, 40, 9.0}),
+    [](const auto& group) { return group.param.name; });
+
+TEST(AccuracyCheck, FailsOnANumberThatIsNone) {
+  AccuracyCheck check{"g", "n", std::nan(""), 1.0, 1.0, "1", ""};
+  EXPECT_FALSE(check.passed());
+  EXPECT_EQ(matching_digits(std::nan(""), 1.0), 0.0);
+  check.computed = 2.0 + 1e-9;
+  EXPECT_FALSE(check.passed());
+  EXPECT_NEAR(matching_digits(1.001, 1.0), 3.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace truebox
