@@ -13,3 +13,11 @@ find_package(nlohmann_json CONFIG REQUIRED)
 find_package(Ceres CONFIG REQUIRED)
 # Debian puts this config into /usr/share/cmake itself, where find_package does not look.
 find_package(OpenColorIO CONFIG REQUIRED PATHS /usr/share/cmake NO_DEFAULT_PATH)
+# Debian's OpenColorIO 2.1.2 config was moved without its prefix and names the folder "/include",
+# which does not exist; its headers lie in the compiler's own search path.
+if(NOT EXISTS /include)
+  get_target_property(ocio_include OpenColorIO::OpenColorIO INTERFACE_INCLUDE_DIRECTORIES)
+  if(ocio_include STREQUAL "/include")
+    set_target_properties(OpenColorIO::OpenColorIO PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "")
+  endif()
+endif()
