@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "image/image_file.h"
+#include "image/spectral_image.h"
+#include "radiometry/table_file.h"
+
+namespace truebox {
+namespace {
+
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+const std::string kScene = std::string(TRUEBOX_REFERENCE_DIR) + "/cornell_box/cornell_box.toml";
+
+struct Outcome {
+  int code = -1;
+  std::string text;  // stdout and stderr
+};
+
+Outcome run(const std::string& arguments) {
+  const std::string command =
+      "TRUEBOX_REFERENCE='" TRUEBOX_REFERENCE_DIR "' '" TRUEBOX_PROGRAM "' " + arguments + " 2>&1";
+  FILE* pipe = popen(command.c_str(), "r");
+  Outcome result;
+  if (!pipe) return result;
+  char buffer[4096];
+  for (std::size_t n; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) result.text.append(buffer, n);
+  const int status = pclose(pipe);
+  result.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return result;
+}
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+constexpr char kSmallRoom[] = R"(length_unit = "m"
+[bands]
+centres_nm = [450, 550, 650]
+[materials.white]
+reflectance = { nm = [400, 700], value = [0.3, 0.8] }
+[materials.lamp]
+reflectance = 0.5
+exitance = 1
+[[surfaces]]
+name = "floor"
+material = "white"
+vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+[[surfaces]]
+name = "ceiling"
+material = "lamp"
+vertices = [[0, 0, 1], [0, 1, 1], [1, 1, 1], [1, 0, 1]]
+[[surfaces]]
+name = "wall"
+material = "white"
+vertices = [[0, 1, 0], [1, 1, 0], [1, 1, 1], [0, 1, 1]]
+[cameras.eye]
+position = [0.5, -1, 0.5]
+direction = [0, 1, 0]
+up = [0, 0, 1]
+focal_length_mm = 35
+film_mm = [25, 25]
+pixels = [16, 12]
+)";
+
+class Program : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) /
+              ("truebox_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) +
+               std::to_string(getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override {
+    for (const auto& entry : fs::directory_iterator(folder_))
+      EXPECT_EQ(entry.path().string().find(".part"), std::string::npos)
+          << entry.path() << " was left behind";
+    fs::remove_all(folder_);
+  }
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    return file(name);
+  }
+  std::string room() const { return write("room.toml", kSmallRoom); }
+
+  fs::path folder_;
+};
+
+TEST_F(Program, EveryCommandHasHelpWithAnExample) {
+  for (const char* command : {"", "demo", "plan", "solve", "probe", "render", "calibrate", "fit",
+                              "compare", "report", "validate"}) {
+    const Outcome help = run(std::string(command) + " --help");
+    EXPECT_EQ(help.code, 0) << command;
+    EXPECT_THAT(help.text, HasSubstr("Example")) << command;
+  }
+}
+
+TEST_F(Program, WrongUsageIs64) {
+  for (const std::string arguments :
+       {"", "nonsense", "solve", "solve --no-such-option x.toml", "render x.toml",
+        "solve x.toml --elements many", "solve x.toml --method magic", "validate --only everything"})
+    EXPECT_EQ(run(arguments).code, 64) << arguments;
+}
+
+TEST_F(Program, BrokenSceneIs4AndNamesThePlace) {
+  std::string text = kSmallRoom;
+  text.replace(text.find("material = \"lamp\""), 17, "material = \"lump\"");
+  const std::string scene = write("broken.toml", text);
+  for (const std::string& arguments :
+       {"plan " + scene, "solve " + scene, "render " + scene + " -o " + file("x.exr")}) {
+    const Outcome broken = run(arguments);
+    EXPECT_EQ(broken.code, 4) << arguments;
+    EXPECT_THAT(broken.text, HasSubstr("broken.toml:15: expected one of the materials lamp, white"));
+    EXPECT_THAT(broken.text, HasSubstr("found \"lump\""));
+  }
+  EXPECT_FALSE(fs::exists(file("x.exr")));
+}
+
+TEST_F(Program, UnsortedSpectrumIs4) {
+  std::string text = kSmallRoom;
+  text.replace(text.find("[400, 700]"), 10, "[700, 400]");
+  const Outcome broken = run("solve " + write("broken.toml", text));
+  EXPECT_EQ(broken.code, 4);
+  EXPECT_THAT(broken.text, HasSubstr("broken.toml:5: expected a sorted spectrum"));
+}
+
+TEST_F(Program, MissingFileIs4) {
+  for (const std::string& arguments :
+       {"solve " + file("none.toml"), "plan " + file("none.toml"), "fit " + file("none.toml"),
+        "compare " + file("none.exr") + " " + file("none.exr"),
+        "probe " + room() + " --points " + file("none.csv")}) {
+    const Outcome missing = run(arguments);
+    EXPECT_EQ(missing.code, 4) << arguments;
+    EXPECT_THAT(missing.text, HasSubstr("none.")) << arguments;
+  }
+}
+
+TEST_F(Program, UnknownCameraIs4AndListsTheKnown) {
+  const Outcome unknown = run("render " + room() + " --elements 100 --camera ear -o " + file("x.exr"));
+  EXPECT_EQ(unknown.code, 4);
+  EXPECT_THAT(unknown.text, HasSubstr("eye"));
+}
+
+TEST_F(Program, PlanSaysWhyAndWritesJson) {
+  const Outcome plan = run("plan " + kScene + " --json " + file("plan.json"));
+  EXPECT_EQ(plan.code, 0);
+  EXPECT_THAT(plan.text, HasSubstr("occlusion: modelled"));
+  const auto json = nlohmann::json::parse(text_of(file("plan.json")));
+  EXPECT_EQ(json["bands"], 76);
+  EXPECT_TRUE(json["occlusion"].get<bool>());
+}
+
+TEST_F(Program, SolveLeavesJsonAndVtu) {
+  ASSERT_EQ(run("solve " + kScene + " --elements 200 -o " + file("s.json") + " --summary " +
+                file("sum.json")).code, 0);
+  const auto json = nlohmann::json::parse(text_of(file("s.json")));
+  ASSERT_EQ(json["surfaces"].size(), 17u);
+  EXPECT_EQ(json["surfaces"][0]["name"], "floor");
+  EXPECT_EQ(json["surfaces"][0]["radiosity"].size(), 76u);
+  EXPECT_GT(json["surfaces"][0]["radiosity"][40].get<double>(), 0.0);
+  EXPECT_EQ(json["units"]["area"], "m^2");
+  EXPECT_TRUE(nlohmann::json::accept(text_of(file("sum.json"))));
+  ASSERT_EQ(run("solve " + room() + " --elements 200 -o " + file("s.vtu")).code, 0);
+  EXPECT_THAT(text_of(file("s.vtu")), HasSubstr("</VTKFile>"));
+  EXPECT_EQ(run("solve " + room() + " -o " + file("s.doc")).code, 4);
+}
+
+TEST_F(Program, ProbeLeavesATable) {
+  const std::string points = write("p.csv", "name,x,y,z,nx,ny,nz\n\"a, b\",0.5,0.5,0,0,0,1\nc,0.2,0.3,0,0,0,2\n");
+  ASSERT_EQ(run("probe " + room() + " --elements 200 --points " + points + " -o " + file("o.csv")).code, 0);
+  const TableFile table = read_table(file("o.csv"));
+  ASSERT_EQ(table.rows.size(), 6u);
+  EXPECT_EQ(table.rows[0][0], "a, b");
+  EXPECT_TRUE(table.header.contains("unit"));
+  for (std::size_t row = 0; row < 6; ++row) {
+    EXPECT_GT(table.number(row, table.column_index("irradiance")), 0.1);
+    EXPECT_LT(table.number(row, table.column_index("error_bound")),
+              0.2 * table.number(row, table.column_index("irradiance")));
+  }
+}
+
+TEST_F(Program, RenderLeavesASpectralImage) {
+  ASSERT_EQ(run("render " + room() + " --elements 200 --camera eye -o " + file("r.exr") +
+                " --error-bound " + file("b.exr")).code, 0);
+  const Image image = read_image(file("r.exr")), bound = read_image(file("b.exr"));
+  EXPECT_EQ(image.width, 16);
+  EXPECT_EQ(image.height, 12);
+  EXPECT_THAT(spectral_channels(image).wavelengths_nm, testing::ElementsAre(450, 550, 650));
+  EXPECT_EQ(spectral_channels(bound).indices.size(), 3u);
+  for (const char* name : {"R", "G", "B"}) EXPECT_NE(image.find(name), nullptr) << name;
+  EXPECT_EQ(image.attributes.at("unit"), "W m^-2 sr^-1 nm^-1");
+  // The wall fills the middle: rho E / pi with 0 < E < 3.
+  const float middle = image.channels[spectral_channels(image).indices[1]].samples[image.index(8, 6)];
+  EXPECT_GT(middle, 0.01f);
+  EXPECT_LT(middle, 1.0f);
+}
+
+TEST_F(Program, CompareTellsSizesTruncationAndAgreementApart) {
+  for (const char* size : {"16 12", "12 16"})
+    ASSERT_EQ(run("render " + room() + " --elements 100 --pixels " + size + " -o " +
+                  file("r" + std::string(size, 2) + ".exr")).code, 0);
+  EXPECT_EQ(run("compare " + file("r16.exr") + " " + file("r16.exr")).code, 0);
+  EXPECT_EQ(run("compare " + file("r16.exr") + " " + file("r12.exr")).code, 3);
+  const std::string whole = text_of(file("r16.exr"));
+  write("cut.exr", whole.substr(0, whole.size() / 2));
+  const Outcome cut = run("compare " + file("cut.exr") + " " + file("r16.exr"));
+  EXPECT_EQ(cut.code, 4);
+  EXPECT_THAT(cut.text, HasSubstr("cut.exr"));
+  EXPECT_EQ(run("compare " + write("empty.exr", "") + " " + file("r16.exr")).code, 4);
+  EXPECT_EQ(run("compare " + write("text.exr", "no image") + " " + file("r16.exr")).code, 4);
+}
+
+TEST_F(Program, WhatCannotBeHadIs5AndWhatCannotBeWrittenIs74) {
+  // 50000 elements need 18 GiB of form factors; the limit is 8 GiB.
+  const Outcome large = run("solve " + room() + " --elements 50000");
+  EXPECT_EQ(large.code, 5) << large.text;
+  EXPECT_THAT(large.text, HasSubstr("MiB"));
+  write("a_file", "in the way of a folder");
+  EXPECT_EQ(run("solve " + room() + " --elements 100 -o " + file("a_file/s.json")).code, 74);
+}
+
+TEST_F(Program, ThreadsDoNotChangeANumber) {
+  for (const char* threads : {"1", "2"})
+    ASSERT_EQ(run("solve " + kScene + " --elements 200 --threads " + threads + " -o " +
+                  file(std::string("t") + threads + ".json")).code, 0);
+  const auto one = nlohmann::json::parse(text_of(file("t1.json")));
+  const auto two = nlohmann::json::parse(text_of(file("t2.json")));
+  EXPECT_EQ(one["surfaces"], two["surfaces"]);
+}
+
+}  // namespace
+}  // namespace truebox
