@@ -85,7 +85,12 @@ std::string describe(const Predicted& p) {
                          f.closure_residual_max)
                    : fmt::format("  the scene is open (no repair); largest row sum {:.6f}\n",
                                  f.row_sum_max);
-  return text + "  radiosity: " + grid.solve.brief() + "\n";
+  text += "  radiosity: " + grid.solve.brief() + "\n";
+  if (!p.prediction->bound_is_reliable())
+    text += fmt::format(
+        "  error bound: an estimate only, the grid is too coarse ({} elements a surface; {} wanted)\n",
+        grid.mesh.size() / grid.mesh.pieces.size(), Prediction::kPatchesAPiece);
+  return text;
 }
 
 std::vector<SurfaceMean> surface_means(const Prediction& prediction) {

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "transport/grid_difference.h"
+#include "transport/prediction.h"
+
+namespace truebox {
+namespace {
+
+using Eigen::Index;
+
+// Exponent of B = B0 + c x^lambda at a right-angled edge of reflectance rho: the Mellin transform
+// of the edge's kernel, 1 = (rho / 4) G(1 + l/2) G((1 - l)/2) / G(3/2); 0.763 at rho = 0.5.
+double edge_exponent(double rho) {
+  const auto excess = [rho](double l) {
+    return 0.25 * rho * std::tgamma(1.0 + 0.5 * l) * std::tgamma(0.5 * (1.0 - l)) /
+               std::tgamma(1.5) -
+           1.0;
+  };
+  double low = 0.0, high = 1.0 - 1e-9;
+  for (int step = 0; step < 60; ++step) {
+    const double middle = 0.5 * (low + high);
+    (excess(middle) > 0.0 ? high : low) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+// 1 / (2^lambda - 1) in each band: at a point the grids may converge as slowly as an edge does.
+Eigen::VectorXd pointwise_factor(const Scene& scene) {
+  Eigen::VectorXd factor(static_cast<Index>(scene.bands.size()));
+  for (Index k = 0; k < factor.size(); ++k) {
+    double rho = 0.0;
+    for (const Material& m : scene.materials)
+      rho = std::max(rho, m.reflectance[static_cast<std::size_t>(k)]);
+    factor[k] = 1.0 / (std::exp2(edge_exponent(rho)) - 1.0);
+  }
+  return factor;
+}
+
+}  // namespace
+
+// A solver's bound holds for every element, so for any mean of them.
+Eigen::VectorXd Prediction::solver_bounds() const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(indirect_bound_.cols());
+  for (const auto& level : levels_) sum += level->solution.solve.error_bound;
+  return sum;
+}
+
+void Prediction::compare_grids() {
+  const PatchMesh& mesh = fine().mesh;
+  const auto bands = fine().indirect.cols();
+  indirect_bound_ = BandMatrix::Zero(fine().indirect.rows(), bands);
+  if (!needs_.interreflection) return;
+  const Eigen::VectorXd factor = pointwise_factor(distinct_scene_);
+  parent_.resize(mesh.size());
+  tbb::parallel_for(
+      tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.size())),
+      [&](const auto& range) {
+        Eigen::VectorXd at[3] = {Eigen::VectorXd(bands), Eigen::VectorXd(bands), Eigen::VectorXd(bands)};
+        for (std::uint32_t i = range.begin(); i < range.end(); ++i) {
+          const Patch& patch = mesh.patches[i];
+          std::uint32_t element[3] = {i, 0, 0};
+          for (int k = 1; k < 3; ++k)
+            element[k] = levels_[k]->smooth->find_patch(patch.piece, patch.centroid);
+          parent_[i] = element[1];
+          if (!fine().usable[i]) continue;
+          const auto compare = [&](const Vec3& point) {
+            for (int k = 0; k < 3; ++k) levels_[k]->smooth->evaluate(element[k], point, at[k]);
+            const Eigen::VectorXd guard = guarded_difference(at[0], at[1], at[2], kSmoothOrder);
+            const Eigen::VectorXd own = factor.cwiseProduct((at[0] - at[1]).cwiseAbs());
+            indirect_bound_.row(i) = indirect_bound_.row(i).cwiseMax(guard.cwiseMax(own).transpose());
+          };
+          compare(patch.centroid);
+          for (std::uint32_t v : mesh.corners_of(patch))
+            compare(patch.centroid + 0.95 * (mesh.vertices[v] - patch.centroid));
+        }
+      });
+  share_bounds_at_contacts();
+  indirect_bound_.rowwise() += solver_bounds().transpose();
+}
+
+// Where another surface stands on this one the light turns around its corners within an element:
+// by chance one of them may agree on all grids, so those that meet there share the largest.
+void Prediction::share_bounds_at_contacts() {
+  const PatchMesh& mesh = fine().mesh;
+  std::vector<std::vector<std::uint32_t>> patches_at(mesh.vertices.size());
+  std::vector<char> is_contact(mesh.vertices.size(), 0);
+  for (std::uint32_t i = 0; i < mesh.size(); ++i)
+    for (std::uint32_t v : mesh.corners_of(mesh.patches[i])) {
+      if (fine().usable[i]) patches_at[v].push_back(i);
+      else is_contact[v] = 1;
+    }
+  const BandMatrix own = indirect_bound_;
+  for (std::size_t v = 0; v < patches_at.size(); ++v) {
+    if (!is_contact[v]) continue;
+    for (std::uint32_t i : patches_at[v])
+      for (std::uint32_t j : patches_at[v])
+        indirect_bound_.row(i) = indirect_bound_.row(i).cwiseMax(own.row(j));
+  }
+}
+
+BandMatrix Prediction::surface_irradiance_bound() const {
+  const auto surfaces = static_cast<Index>(scene_->surfaces.size());
+  BandMatrix all = BandMatrix::Zero(surfaces, static_cast<Index>(scene_->bands.size()));
+  if (!needs_.interreflection) return all;
+  const PatchMesh &mesh = fine().mesh, &next = coarse().mesh;
+  const Index bands = fine().indirect.cols();
+  BandMatrix children = BandMatrix::Zero(coarse().indirect.rows(), bands);
+  Eigen::VectorXd children_area = Eigen::VectorXd::Zero(children.rows());
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    if (!fine().usable[i]) continue;
+    const double area = mesh.patches[i].area_m2;
+    children.row(parent_[i]) += area * fine().indirect.row(static_cast<Index>(i));
+    children_area[parent_[i]] += area;
+  }
+  Eigen::VectorXd area = Eigen::VectorXd::Zero(surfaces);
+  BandMatrix sum = BandMatrix::Zero(surfaces, bands);
+  for (std::size_t p = 0; p < next.size(); ++p) {
+    const auto row = static_cast<Index>(p);
+    const auto surface = static_cast<Index>(next.surface_of(next.patches[p]));
+    sum.row(surface) +=
+        (children.row(row) - children_area[row] * coarse().indirect.row(row)).cwiseAbs();
+    area[surface] += children_area[row];
+  }
+  for (Index s = 0; s < surfaces; ++s)
+    if (area[s] > 0.0)
+      all.row(s) = expand(sum.row(s).transpose() / area[s] + solver_bounds()).transpose();
+  return all;
+}
+
+}  // namespace truebox
