@@ -22,7 +22,7 @@ int plan(const std::string& path, const std::string& json_file, std::size_t elem
                                  scene.surfaces.size(), scene.materials.size(), scene.bands.size());
   for (const auto& reason : needs.reasons) text += "  " + reason + "\n";
   text += needs.interreflection
-              ? fmt::format("  method: full matrix of form factors, {} elements, {} MiB; two grids, "
+              ? fmt::format("  method: full matrix of form factors, {} elements, {} MiB; three grids, "
                             "constant elements, conjugate gradients\n",
                             elements, bytes >> 20)
               : "  method: direct light only, no form factors\n";

@@ -149,7 +149,7 @@ SmoothField::SmoothField(const PatchMesh& mesh, const std::vector<char>& usable,
     for (std::uint32_t k = 0; k < patch.corner_count; ++k) {
       const std::uint32_t vertex = mesh.corners[patch.first_corner + k];
       auto neighbours = reachable(mesh, topology, usable, p, vertex, 2);
-      if (neighbours.size() < 8) neighbours = reachable(mesh, topology, usable, p, vertex, 3);
+      if (neighbours.size() < 10) neighbours = reachable(mesh, topology, usable, p, vertex, 3);
       const auto [it, is_new] =
           known.try_emplace({vertex, neighbours}, static_cast<std::uint32_t>(corners_.size()));
       corner_of_[patch.first_corner + k] = it->second;

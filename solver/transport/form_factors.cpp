@@ -353,17 +353,19 @@ class Builder {
 
 }  // namespace
 
+void require_memory(std::size_t elements, const FormFactorOptions& options) {
+  const std::size_t bytes = elements * elements * sizeof(double);
+  if (bytes <= options.memory_limit_bytes) return;
+  const double fits = std::sqrt(static_cast<double>(options.memory_limit_bytes) / sizeof(double));
+  throw std::length_error(std::to_string(elements) + " elements need " +
+                          std::to_string(bytes >> 20) + " MiB of form factors, the limit is " +
+                          std::to_string(options.memory_limit_bytes >> 20) + " MiB; that fits " +
+                          std::to_string(static_cast<std::size_t>(fits)) + " elements");
+}
+
 FormFactors form_factors(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
                          const FormFactorOptions& options) {
-  const std::size_t bytes = mesh.size() * mesh.size() * sizeof(double);
-  if (bytes > options.memory_limit_bytes)
-    throw std::length_error(
-        std::to_string(mesh.size()) + " elements need " + std::to_string(bytes >> 20) +
-        " MiB of form factors, the limit is " + std::to_string(options.memory_limit_bytes >> 20) +
-        " MiB; that fits " +
-        std::to_string(static_cast<std::size_t>(
-            std::sqrt(static_cast<double>(options.memory_limit_bytes) / sizeof(double)))) +
-        " elements");
+  require_memory(mesh.size(), options);
   return Builder(mesh, scene, visibility, options).build();
 }
 

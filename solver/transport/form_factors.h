@@ -46,12 +46,15 @@ struct FormFactors {
   Eigen::Index size() const { return area_m2.size(); }
 };
 
+/// Throws std::length_error with the sizes if n^2 doubles exceed the memory limit.
+void require_memory(std::size_t elements, const FormFactorOptions& options);
+
 /// Analytic kernel times visible share. Pairs that no surface can come between (half-space and box
 /// tests) take the kernel alone; the others are sampled by quasi-random ray pairs weighted with the
 /// kernel. If the scene is closed, only sampled factors are scaled, symmetrically, until rows sum
 /// to 1 (Sinkhorn); the summary says by how much.
 /// Sources: Sinkhorn & Knopp (1967); low-discrepancy recurrence: Roberts (2018).
-/// Throws std::length_error with the sizes if n^2 doubles exceed the memory limit.
+/// Throws as require_memory.
 FormFactors form_factors(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
                          const FormFactorOptions& options);
 

@@ -65,6 +65,8 @@ Prediction::Prediction(const Scene& scene, const PredictOptions& options)
     : scene_(&scene), needs_(requirements(scene)) {
   distinct_scene_ = only_bands(scene, needs_.distinct_bands);
   const double edge_m = edge_for_count(scene, std::max<std::size_t>(1, options.elements / 16));
+  if (needs_.interreflection)  // the finest grid decides; better told before the others are solved
+    require_memory(uniform_mesh(distinct_scene_, edge_m, 2).size(), options.form_factors);
   for (int k = 2; k >= 0; --k) levels_[k] = solve_level(edge_m, 2 - k, options);
   visibility_ = std::make_unique<Visibility>(fine().mesh, scene);
   compare_grids();
