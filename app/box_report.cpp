@@ -28,7 +28,8 @@ const std::vector<float>& band(const Image& image, double nm) {
   const SpectralChannels bands = spectral_channels(image);
   std::size_t best = 0;
   for (std::size_t k = 0; k < bands.indices.size(); ++k)
-    if (std::abs(bands.wavelengths_nm[k] - nm) < std::abs(bands.wavelengths_nm[best] - nm)) best = k;
+    if (std::abs(bands.wavelengths_nm[k] - nm) < std::abs(bands.wavelengths_nm[best] - nm))
+      best = k;
   return image.channels[bands.indices[best]].samples;
 }
 
@@ -37,11 +38,10 @@ struct IndependentRender {
 };
 
 Image with_colour(Image image, const Observer& observer) {
-  std::erase_if(image.channels, [](const Channel& c) {
-    return spectral_channel_wavelength_nm(c.name) < 0.0;
-  });
-  add_display_channels(
-      image, WavelengthGrid::from_centres(spectral_channels(image).wavelengths_nm), observer);
+  std::erase_if(image.channels,
+                [](const Channel& c) { return spectral_channel_wavelength_nm(c.name) < 0.0; });
+  add_display_channels(image, WavelengthGrid::from_centres(spectral_channels(image).wavelengths_nm),
+                       observer);
   return image;
 }
 
@@ -73,8 +73,10 @@ PictureRow comparison_row(const RenderedImage& image, const IndependentRender& o
                         "difference in standard errors of the path tracer"});
   row.caption =
       "The published Cornell Box, both simulated, by programs that share no code: seven bands, one "
-      "exposure. Grain in the difference is the path tracer's noise. Structure is error: at the feet of "
-      "the blocks indirect light falls off faster than the elements resolve, and the bound below is "
+      "exposure. Grain in the difference is the path tracer's noise. Structure is error: at the "
+      "feet of "
+      "the blocks indirect light falls off faster than the elements resolve, and the bound below "
+      "is "
       "largest there.";
   return row;
 }
@@ -114,8 +116,12 @@ Table group_table(const std::vector<AccuracyCheck>& checks) {
     g.digits.push_back(matching_digits(c.computed, c.certified));
   }
   Table table{"The program against closed forms and certified values, in matching digits",
-              {{"Group"}, {"Checks"}, {"Failed"}, {"Fewest digits", "1", 1, true},
-               {"Median digits", "1", 1, true}, {"Outcome"}},
+              {{"Group"},
+               {"Checks"},
+               {"Failed"},
+               {"Fewest digits", "1", 1, true},
+               {"Median digits", "1", 1, true},
+               {"Outcome"}},
               {}};
   for (auto& [name, g] : groups) {
     std::sort(g.digits.begin(), g.digits.end());
@@ -129,8 +135,12 @@ Table group_table(const std::vector<AccuracyCheck>& checks) {
 Table probe_table(const std::vector<AccuracyCheck>& checks) {
   Table table{fmt::format("Irradiance at 34 points, {:.0f} nm: prediction against path tracing",
                           kShownBand_nm),
-              {{"Point"}, {"Prediction", "W m^-2 nm^-1", 5}, {"Path tracer", "W m^-2 nm^-1", 5},
-               {"Difference", "%", 3, true}, {"Allowed", "%", 3, true}, {"Outcome"}},
+              {{"Point"},
+               {"Prediction", "W m^-2 nm^-1", 5},
+               {"Path tracer", "W m^-2 nm^-1", 5},
+               {"Difference", "%", 3, true},
+               {"Allowed", "%", 3, true},
+               {"Outcome"}},
               {}};
   const std::string mark = fmt::format(", {:.0f} nm", kShownBand_nm);
   for (const AccuracyCheck& c : checks) {
@@ -149,14 +159,17 @@ Table plan_table(const Predicted& predicted) {
   for (std::string line; std::getline(text, line);) {
     const std::size_t begin = line.find_first_not_of(' '), colon = line.find(": ");
     if (begin == std::string::npos) continue;
-    if (colon == std::string::npos) table.rows.push_back({"grid", line.substr(begin)});
-    else table.rows.push_back({line.substr(begin, colon - begin), line.substr(colon + 2)});
+    if (colon == std::string::npos)
+      table.rows.push_back({"grid", line.substr(begin)});
+    else
+      table.rows.push_back({line.substr(begin, colon - begin), line.substr(colon + 2)});
   }
   return table;
 }
 
 Figure wall_spectra(const Predicted& predicted) {
-  LinePlot plot{"Mean radiosity of surfaces", {"wavelength", "nm"}, {"radiosity", "W m^-2 nm^-1"}, {}};
+  LinePlot plot{
+      "Mean radiosity of surfaces", {"wavelength", "nm"}, {"radiosity", "W m^-2 nm^-1"}, {}};
   for (const SurfaceMean& mean : surface_means(*predicted.prediction)) {
     if (mean.surface != "floor" && mean.surface != "back_wall" && mean.surface != "left_wall" &&
         mean.surface != "right_wall")
@@ -169,16 +182,17 @@ Figure wall_spectra(const Predicted& predicted) {
     }
     plot.series.push_back(std::move(series));
   }
-  return {"Mean radiosity", to_svg(plot),
-          "76 bands solved in one pass; the ribbon is the error bound. The lamp's table has no unit: "
-          "its numbers are taken as W m^-2 nm^-1."};
+  return {
+      "Mean radiosity", to_svg(plot),
+      "76 bands solved in one pass; the ribbon is the error bound. The lamp's table has no unit: "
+      "its numbers are taken as W m^-2 nm^-1."};
 }
 
 }  // namespace
 
 ReportPart box_report(const Predicted& predicted, const RenderedImage& image,
-                     const std::vector<AccuracyCheck>& accuracy,
-                     const std::filesystem::path& reference_dir) {
+                      const std::vector<AccuracyCheck>& accuracy,
+                      const std::filesystem::path& reference_dir) {
   const auto folder = reference_dir / "independent_renders";
   const IndependentRender other{read_image(folder / "cornell_box_front_256_7bands.exr"),
                                 read_image(folder / "cornell_box_front_256_7bands_stderr.exr")};
@@ -191,11 +205,10 @@ ReportPart box_report(const Predicted& predicted, const RenderedImage& image,
   ReportPart report;
   std::size_t failed = 0;
   for (const AccuracyCheck& c : accuracy) failed += !c.passed();
-  report.checks.push_back({"closed forms and certified values: failed checks",
-                           failed == 0 ? Agreement::agrees : Agreement::fails,
-                           static_cast<double>(failed), 0.0, "",
-                           fmt::format("of {}; `truebox validate --details` lists them",
-                                       accuracy.size())});
+  report.checks.push_back(
+      {"closed forms and certified values: failed checks",
+       failed == 0 ? Agreement::agrees : Agreement::fails, static_cast<double>(failed), 0.0, "",
+       fmt::format("of {}; `truebox validate --details` lists them", accuracy.size())});
   report.checks.push_back(
       {"Cornell Box render: samples outside own bound + 3 standard errors",
        agreement.share_outside() <= kAllowedOutside ? Agreement::agrees : Agreement::fails,
@@ -212,27 +225,32 @@ ReportPart box_report(const Predicted& predicted, const RenderedImage& image,
   box.blocks.push_back(comparison_row(image, other, observer, colour, z));
   box.blocks.push_back(bound_row(image));
   const std::vector<double> scores(z.begin(), z.end());
-  box.blocks.push_back(
-      Figure{"z of every pixel", z_histogram_svg("(prediction - path tracer) / standard error", scores),
-             fmt::format("{:.0f} nm; a normal distribution is what pure noise would leave.",
-                         kShownBand_nm)});
+  box.blocks.push_back(Figure{
+      "z of every pixel", z_histogram_svg("(prediction - path tracer) / standard error", scores),
+      fmt::format("{:.0f} nm; a normal distribution is what pure noise would leave.",
+                  kShownBand_nm)});
   box.blocks.push_back(wall_spectra(predicted));
   Section plan{"What was modelled, and how", {plan_table(predicted)}};
-  report.sections = {std::move(box), std::move(plan),
-                     {"Is the equation solved right?", {group_table(accuracy), probe_table(accuracy)}}};
+  report.sections = {
+      std::move(box),
+      std::move(plan),
+      {"Is the equation solved right?", {group_table(accuracy), probe_table(accuracy)}}};
   report.sentence = fmt::format(
-      "the predicted Cornell Box agrees with independent path tracing (bias {:+.2f} %, bound {:.2f} %)",
+      "the predicted Cornell Box agrees with independent path tracing (bias {:+.2f} %, bound "
+      "{:.2f} %)",
       100.0 * agreement.bias, 100.0 * agreement.mean_bound);
   if (worst_outcome(report.checks) == Agreement::fails)
     report.sentence = fmt::format(
-        "the prediction of the Cornell Box fails: {} of {} certified checks, {:.2f} % of pixel-bands "
+        "the prediction of the Cornell Box fails: {} of {} certified checks, {:.2f} % of "
+        "pixel-bands "
         "outside the bound",
         failed, accuracy.size(), 100.0 * agreement.share_outside());
-  report.provenance = {{"Scene", predicted.scene.path},
-                       {"Cornell Box data",
-                        "Cornell University Program of Computer Graphics, Cornell Box data page"},
-                       {"Independent render",
-                        "brute-force path tracing, 1024 paths a pixel, no shared code (simulated)"}};
+  report.provenance = {
+      {"Scene", predicted.scene.path},
+      {"Cornell Box data",
+       "Cornell University Program of Computer Graphics, Cornell Box data page"},
+      {"Independent render",
+       "brute-force path tracing, 1024 paths a pixel, no shared code (simulated)"}};
   return report;
 }
 

@@ -41,7 +41,8 @@ Image ChartColour::composite(std::vector<float> ChartPlanes::*plane) const {
   for (const char* name : {"R", "G", "B"}) image.add_channel(name);
   std::vector<double> value(weights_.size());
   for (std::size_t i = 0; i < image.pixel_count(); ++i) {
-    for (std::size_t b = 0; b < value.size(); ++b) value[b] = (measurement_.bands[b].planes.*plane)[i];
+    for (std::size_t b = 0; b < value.size(); ++b)
+      value[b] = (measurement_.bands[b].planes.*plane)[i];
     const LinearRgb rgb = linear_bt709(colour_of(value));
     for (std::size_t c = 0; c < 3; ++c) image.channels[c].samples[i] = static_cast<float>(rgb[c]);
   }
@@ -69,14 +70,18 @@ PictureRow ChartColour::pictures(const ColourPipeline& pipeline) const {
                         "signed difference inside the patches"});
   row.caption =
       "Colour from seven bands under CIE D65 for the CIE 1931 observer; one exposure for both. The "
-      "colours are those of seven samples of a spectrum, not of the whole spectrum. Bottom row: the "
+      "colours are those of seven samples of a spectrum, not of the whole spectrum. Bottom row: "
+      "the "
       "six grey standards, inputs of the fit.";
   return row;
 }
 
 Table ChartColour::table() const {
   Table table{"Colour difference of the held-out patches, fitted against certified bands",
-              {{"Patch"}, {"L*", "1", 1, true}, {"a*", "1", 1, true}, {"b*", "1", 1, true},
+              {{"Patch"},
+               {"L*", "1", 1, true},
+               {"a*", "1", 1, true},
+               {"b*", "1", 1, true},
                {"CIEDE2000", "1", 2, true}},
               {}};
   const Tristimulus white = colour_of(std::vector<double>(weights_.size(), 1.0));
@@ -103,7 +108,8 @@ Table ChartColour::table() const {
       variance += std::pow(difference_of(moved) - difference, 2);
     }
     const Lab lab = cielab(colour_of(fitted), white);
-    table.rows.push_back({first[p].patch, lab.L, lab.a, lab.b, Cell(difference, std::sqrt(variance))});
+    table.rows.push_back(
+        {first[p].patch, lab.L, lab.a, lab.b, Cell(difference, std::sqrt(variance))});
   }
   return table;
 }

@@ -11,8 +11,8 @@
 
 namespace truebox::app {
 
-/// Colours of a chart measured in a few bands, under D65 for the CIE 1931 observer: each band stands
-/// for the wavelengths nearest to it, a perfect white has Y = 1.
+/// Colours of a chart measured in a few bands, under D65 for the CIE 1931 observer: each band
+/// stands for the wavelengths nearest to it, a perfect white has Y = 1.
 class ChartColour {
  public:
   ChartColour(const ChartMeasurement& measurement, const std::filesystem::path& colour_dir);

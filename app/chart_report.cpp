@@ -18,10 +18,9 @@ namespace {
 
 // RMS differences of an earlier analysis of these photographs: quadratic illumination, the
 // reflectances of all patches used in fitting it (that is, not held out).
-const std::map<std::string, double> kEarlierRms = {{"400 nm", 0.064}, {"450 nm", 0.011},
-                                                   {"500 nm", 0.010}, {"550 nm", 0.009},
-                                                   {"600 nm", 0.017}, {"650 nm", 0.012},
-                                                   {"700 nm", 0.021}};
+const std::map<std::string, double> kEarlierRms = {
+    {"400 nm", 0.064}, {"450 nm", 0.011}, {"500 nm", 0.010}, {"550 nm", 0.009},
+    {"600 nm", 0.017}, {"650 nm", 0.012}, {"700 nm", 0.021}};
 
 // The largest count of |E_n| > 1 that chance explains: k = 2 leaves 4.55 % outside, and a binomial
 // count exceeds this with a probability below 1 %.
@@ -68,10 +67,10 @@ std::vector<Check> make_checks(const ChartMeasurement& m) {
   for (const BandMeasurement& band : m.bands) {
     const auto limit = kEarlierRms.find(band.name);
     if (limit == kEarlierRms.end()) continue;
-    checks.push_back({"chart, " + band.name + ": rms of fitted minus certified reflectance",
-                      band.rms <= limit->second ? Agreement::agrees : Agreement::fails, band.rms,
-                      limit->second, "1",
-                      "18 held-out patches; the limit is what an analysis that saw them all reached"});
+    checks.push_back(
+        {"chart, " + band.name + ": rms of fitted minus certified reflectance",
+         band.rms <= limit->second ? Agreement::agrees : Agreement::fails, band.rms, limit->second,
+         "1", "18 held-out patches; the limit is what an analysis that saw them all reached"});
   }
   const std::size_t beyond = m.held_out() - m.agreeing(), limit = binomial_limit(m.held_out());
   checks.push_back({"chart: held-out readings with |E_n| > 1",
@@ -84,7 +83,8 @@ std::vector<Check> make_checks(const ChartMeasurement& m) {
   const double largest = worst.reading ? std::abs(worst.reading->en.value) : 0.0;
   const double family = family_wise_limit(m.held_out());
   checks.push_back({"chart: largest |E_n| of a held-out reading",
-                    largest <= family ? Agreement::agrees : Agreement::warning, largest, family, "1",
+                    largest <= family ? Agreement::agrees : Agreement::warning, largest, family,
+                    "1",
                     worst.reading ? fmt::format("{} at {}; the limit is family-wise, 1 %",
                                                 worst.reading->patch, worst.band)
                                   : "no readings"});
@@ -93,9 +93,15 @@ std::vector<Check> make_checks(const ChartMeasurement& m) {
 
 Table band_table(const ChartMeasurement& m) {
   Table table{"Held-out patches in each band: fitted from the photograph minus spectrometer",
-              {{"Band"}, {"Photosites"}, {"Centre", "nm", 1, true}, {"RMS", "1", 4, true},
-               {"Earlier RMS", "1", 3, true}, {"Largest |E_n|", "1", 2, true}, {"Agree"},
-               {"chi2/nu", "1", 2, true}, {"Veil", "1", 3, true}},
+              {{"Band"},
+               {"Photosites"},
+               {"Centre", "nm", 1, true},
+               {"RMS", "1", 4, true},
+               {"Earlier RMS", "1", 3, true},
+               {"Largest |E_n|", "1", 2, true},
+               {"Agree"},
+               {"chi2/nu", "1", 2, true},
+               {"Veil", "1", 3, true}},
               {}};
   for (const BandMeasurement& band : m.bands) {
     const auto earlier = kEarlierRms.find(band.name);
@@ -110,10 +116,14 @@ Table band_table(const ChartMeasurement& m) {
 }
 
 Table readings_table(const BandMeasurement& band) {
-  Table table{band.name + ": reflectance fitted from the photograph against the spectrometer, u with k = 1",
-              {{"Patch"}, {"Fitted", "1", 4, true}, {"Certified", "1", 4, true},
-               {"Difference", "1", 4, true}, {"E_n", "1", 2, true}},
-              {}};
+  Table table{
+      band.name + ": reflectance fitted from the photograph against the spectrometer, u with k = 1",
+      {{"Patch"},
+       {"Fitted", "1", 4, true},
+       {"Certified", "1", 4, true},
+       {"Difference", "1", 4, true},
+       {"E_n", "1", 2, true}},
+      {}};
   for (const PatchReading& r : band.readings) {
     if (r.standard) continue;
     table.rows.push_back(
@@ -127,10 +137,11 @@ Table readings_table(const BandMeasurement& band) {
 }
 
 Table score_table(const ChartMeasurement& m) {
-  Table table{"E_n of the held-out readings: photograph minus spectrometer over U, k = 2. Beyond "
-              "-1 or 1, marked !, they disagree",
-              {{"Patch"}},
-              {}};
+  Table table{
+      "E_n of the held-out readings: photograph minus spectrometer over U, k = 2. Beyond "
+      "-1 or 1, marked !, they disagree",
+      {{"Patch"}},
+      {}};
   for (const BandMeasurement& band : m.bands) table.columns.push_back({band.name});
   for (std::size_t p = 0; p < m.chart.patches.size(); ++p) {
     if (m.bands.front().readings[p].standard) continue;
@@ -156,13 +167,13 @@ PictureRow band_pictures(const BandMeasurement& band, const ColourPipeline& colo
   row.panels.push_back({"Photograph, " + band.name,
                         plain_picture(p.width, p.height, photo.rgb, photo.note),
                         "linear photograph of the chart through the " + band.name + " filter"});
-  row.panels.push_back({"Prediction", plain_picture(p.width, p.height, predicted.rgb, predicted.note),
+  row.panels.push_back({"Prediction",
+                        plain_picture(p.width, p.height, predicted.rgb, predicted.note),
                         "patches as the spectrometer and the fitted illumination predict them"});
-  row.panels.push_back(
-      {"Photograph - prediction",
-       signed_false_colour(p.width, p.height, difference, 0.1, "reflectance x relative illumination",
-                           "1"),
-       "signed difference inside the patches, zero outside"});
+  row.panels.push_back({"Photograph - prediction",
+                        signed_false_colour(p.width, p.height, difference, 0.1,
+                                            "reflectance x relative illumination", "1"),
+                        "signed difference inside the patches, zero outside"});
   row.caption = fmt::format(
       "{}: one value a 2 x 2 Bayer cell, {} photosites, nothing interpolated. The prediction is "
       "shown inside the patches only; the six grey ones are inputs of the fit.",
@@ -178,7 +189,8 @@ std::vector<Block> spectra_figures(const ChartMeasurement& m) {
   std::vector<Block> blocks;
   constexpr std::size_t kEach = 3;
   for (std::size_t first = 0; first < held_out.size(); first += kEach) {
-    LinePlot plot{"", {"wavelength", "nm", false, ValueRange{380.0, 720.0}}, {"reflectance", "1"}, {}};
+    LinePlot plot{
+        "", {"wavelength", "nm", false, ValueRange{380.0, 720.0}}, {"reflectance", "1"}, {}};
     std::string names;
     for (std::size_t k = first; k < std::min(first + kEach, held_out.size()); ++k) {
       const std::size_t p = held_out[k];
@@ -203,9 +215,10 @@ std::vector<Block> spectra_figures(const ChartMeasurement& m) {
       plot.series.push_back(std::move(points));
     }
     plot.title = names;
-    blocks.push_back(Figure{names, to_svg(plot),
-                            "Curves: spectrometer. Points: fitted from the photographs, bars U = 2 u; "
-                            "horizontal bars: the filters' 10 nm pass band."});
+    blocks.push_back(
+        Figure{names, to_svg(plot),
+               "Curves: spectrometer. Points: fitted from the photographs, bars U = 2 u; "
+               "horizontal bars: the filters' 10 nm pass band."});
   }
   return blocks;
 }
@@ -220,7 +233,8 @@ Paragraph instrument_text(const ChartMeasurement& m) {
   const InstrumentEstimate& i = m.instrument;
   return {fmt::format(
       "Camera: {}. Seven exposures a filter, dark frames subtracted, merged by minimum variance. "
-      "Noise from the photographs themselves: variance = {:.3g} DN^2 + {:.3g} DN x signal. Response: "
+      "Noise from the photographs themselves: variance = {:.3g} DN^2 + {:.3g} DN x signal. "
+      "Response: "
       "offset {:.2f} +- {:.2f} DN, curvature ({:.3g} +- {:.1g}) per DN.",
       m.file.instrument.camera, i.noise.floor_dn2, i.noise.gain_dn,
       i.response.response.offset_dn.value, i.response.response.offset_dn.standard_uncertainty,
@@ -231,7 +245,7 @@ Paragraph instrument_text(const ChartMeasurement& m) {
 }  // namespace
 
 ReportPart chart_report(const ChartMeasurement& m, const Requirements& plan,
-                         const std::filesystem::path& colour_dir) {
+                        const std::filesystem::path& colour_dir) {
   ReportPart report;
   report.checks = make_checks(m);
   const ColourPipeline colour;
@@ -244,25 +258,27 @@ ReportPart chart_report(const ChartMeasurement& m, const Requirements& plan,
   overview.blocks.push_back(band_table(m));
   overview.blocks.push_back(score_table(m));
   for (const BandMeasurement& band : m.bands)
-    if (!band.note.empty())
-      overview.blocks.push_back(Paragraph{band.name + ": " + band.note});
+    if (!band.note.empty()) overview.blocks.push_back(Paragraph{band.name + ": " + band.note});
 
   Section bands{"Band by band", {}};
   for (const BandMeasurement& band : m.bands) bands.blocks.push_back(band_pictures(band, colour));
   Section values{"Fitted against certified values", {}};
   for (const BandMeasurement& band : m.bands) values.blocks.push_back(readings_table(band));
   Section colours{"Colour of the patches", {chart_colour.table()}};
-  report.sections = {std::move(overview), std::move(bands), {"Spectra", spectra_figures(m)},
-                     std::move(values), std::move(colours)};
+  report.sections = {std::move(overview),
+                     std::move(bands),
+                     {"Spectra", spectra_figures(m)},
+                     std::move(values),
+                     std::move(colours)};
 
   const WorstReading worst = worst_reading(m);
   report.sentence = fmt::format("{} of {} chart readings agree with the spectrometer (k = 2)",
                                 m.agreeing(), m.held_out());
   if (worst.reading)
-    report.sentence += fmt::format(
-        "; farthest off is {} at {}: {:.3f} against {:.3f}, E_n = {:.2f}", worst.reading->patch,
-        worst.band, worst.reading->measured.value, worst.reading->reference.value,
-        worst.reading->en.value);
+    report.sentence +=
+        fmt::format("; farthest off is {} at {}: {:.3f} against {:.3f}, E_n = {:.2f}",
+                    worst.reading->patch, worst.band, worst.reading->measured.value,
+                    worst.reading->reference.value, worst.reading->en.value);
   report.provenance = {{"Photographs", m.file.provenance.source},
                        {"Licence of the photographs", m.file.provenance.licence},
                        {"Chart reflectances", m.chart.provenance.source},

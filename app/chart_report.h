@@ -13,6 +13,6 @@ namespace truebox::app {
 /// A chart measurement: pictures, fitted against certified values, spectra, colour differences.
 /// `plan` is what the chart, as a scene, requires; `colour_dir` holds the CIE tables.
 ReportPart chart_report(const ChartMeasurement& measurement, const Requirements& plan,
-                         const std::filesystem::path& colour_dir);
+                        const std::filesystem::path& colour_dir);
 
 }  // namespace truebox::app

@@ -61,13 +61,14 @@ int demo(const DemoArguments& a) {
   fmt::print("{}", describe(*predicted));
 
   fmt::print("2/4  closed forms and certified values\n");
-  std::vector<AccuracyCheck> accuracy = run_validation(reference, kClosedForms, a.elements, progress);
+  std::vector<AccuracyCheck> accuracy =
+      run_validation(reference, kClosedForms, a.elements, progress);
   const auto probes = check_cornell_box_probes(reference, *predicted->prediction);
   accuracy.insert(accuracy.end(), probes.begin(), probes.end());
 
   fmt::print("3/4  the chart's photographs: dark, exposures, reflectances\n");
-  const ChartMeasurement measurement =
-      measure_chart(read_measurement(reference / "llanos_narrowband" / "measurement.toml"), progress);
+  const ChartMeasurement measurement = measure_chart(
+      read_measurement(reference / "llanos_narrowband" / "measurement.toml"), progress);
   if (measurement.outcome() != Outcome::converged) {
     fmt::print(stderr, "truebox: the chart's reflectances could not be fitted\n");
     return kNotSolved;
@@ -103,7 +104,8 @@ int demo(const DemoArguments& a) {
   report.provenance = {{"Program", std::string("truebox ") + kVersion},
                        {"Elements", fmt::format("{}", predicted->prediction->fine().mesh.size())}};
   report.provenance.insert(report.provenance.end(), box.provenance.begin(), box.provenance.end());
-  report.provenance.insert(report.provenance.end(), chart.provenance.begin(), chart.provenance.end());
+  report.provenance.insert(report.provenance.end(), chart.provenance.begin(),
+                           chart.provenance.end());
   write_report(directory, report);
 
   fmt::print("\n{}: {}\nreport: {}\n", to_text(outcome), sentence,

@@ -89,13 +89,13 @@ void print_table(const ChartMeasurement& measurement, bool all_patches) {
   fmt::print("{:<8} {:>4} {:>14} {:>8} {:>9} {:>8} {:>8}  {}\n", "band", "site", "centre / nm",
              "RMS", "max|E_n|", "agree", "chi2/nu", "fit");
   for (const auto& b : measurement.bands) {
-    fmt::print("{:<8} {:>4} {:>7.1f} +- {:<3.1f} {:>8.4f} {:>9.2f} {:>8} {:>8.2f}  {}{}\n", b.name,
-               b.site, b.band.centre_nm.value, b.band.centre_nm.standard_uncertainty, b.rms,
-               b.largest_en, fmt::format("{}/{}", b.agreeing, b.held_out), b.chi2_per_dof,
-               to_string(b.outcome),
-               b.veil_kept ? fmt::format(", veil {:.3f} +- {:.3f}", b.veil.value,
-                                         b.veil.standard_uncertainty)
-                           : "");
+    fmt::print(
+        "{:<8} {:>4} {:>7.1f} +- {:<3.1f} {:>8.4f} {:>9.2f} {:>8} {:>8.2f}  {}{}\n", b.name, b.site,
+        b.band.centre_nm.value, b.band.centre_nm.standard_uncertainty, b.rms, b.largest_en,
+        fmt::format("{}/{}", b.agreeing, b.held_out), b.chi2_per_dof, to_string(b.outcome),
+        b.veil_kept
+            ? fmt::format(", veil {:.3f} +- {:.3f}", b.veil.value, b.veil.standard_uncertainty)
+            : "");
     if (b.outcome != Outcome::converged)
       for (const auto& fit : b.fits) fmt::print("         {}\n", fit.summary.brief());
   }
@@ -106,7 +106,9 @@ void print_table(const ChartMeasurement& measurement, bool all_patches) {
         fmt::print("{:<8} {:<14} {:.4f} +- {:.4f}   reference {:.4f} +- {:.4f}   E_n {:+.2f}{}\n",
                    b.name, r.patch, r.measured.value, r.measured.standard_uncertainty,
                    r.reference.value, r.reference.standard_uncertainty, r.en.value,
-                   r.at_bound ? "  at bound" : r.standard ? "  standard" : "");
+                   r.at_bound   ? "  at bound"
+                   : r.standard ? "  standard"
+                                : "");
   fmt::print("\n{} of {} held-out readings agree\n", measurement.agreeing(),
              measurement.held_out());
 }

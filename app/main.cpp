@@ -34,8 +34,9 @@ int run(const Action& action) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App program{"truebox: is this simulation of light true?\n"
-                   "Predicts with an error bound, measures with an uncertainty, and compares."};
+  CLI::App program{
+      "truebox: is this simulation of light true?\n"
+      "Predicts with an error bound, measures with an uncertainty, and compares."};
   program.set_version_flag("--version", std::string("truebox ") + kVersion);
   program.require_subcommand(1);
   program.footer(

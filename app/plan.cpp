@@ -22,9 +22,10 @@ int plan(const std::string& path, const std::string& json_file, std::size_t elem
                                  scene.surfaces.size(), scene.materials.size(), scene.bands.size());
   for (const auto& reason : needs.reasons) text += "  " + reason + "\n";
   text += needs.interreflection
-              ? fmt::format("  method: full matrix of form factors, {} elements, {} MiB; three grids, "
-                            "constant elements, conjugate gradients\n",
-                            elements, bytes >> 20)
+              ? fmt::format(
+                    "  method: full matrix of form factors, {} elements, {} MiB; three grids, "
+                    "constant elements, conjugate gradients\n",
+                    elements, bytes >> 20)
               : "  method: direct light only, no form factors\n";
   fmt::print("{}", text);
   if (json_file.empty()) return kAgrees;
@@ -43,7 +44,8 @@ int plan(const std::string& path, const std::string& json_file, std::size_t elem
 }  // namespace
 
 void add_plan_command(CLI::App& program, Action& chosen) {
-  auto* command = program.add_subcommand("plan", "what a scene requires, what is left out, and why");
+  auto* command =
+      program.add_subcommand("plan", "what a scene requires, what is left out, and why");
   auto scene = std::make_shared<std::string>(), json = std::make_shared<std::string>();
   auto elements = std::make_shared<std::size_t>(PredictOptions{}.elements);
   command->add_option("SCENE", *scene, "scene file (TOML)")->required();

@@ -76,8 +76,8 @@ std::string describe(const Predicted& p) {
       "  form factors: {} pairs without anything between, {} hidden, {} sampled with {} rays\n",
       f.pairs_unoccluded, f.pairs_hidden, f.pairs_sampled, f.rays);
   if (f.buried_patches > 0)
-    text += fmt::format("  {} elements lie under another surface and see nothing\n",
-                        f.buried_patches);
+    text +=
+        fmt::format("  {} elements lie under another surface and see nothing\n", f.buried_patches);
   text += f.closed ? fmt::format(
                          "  closure: none of {} rays escaped; row sums off by {:.1e} mean, {:.1e} "
                          "max; sampled factors scaled by at most {:.1e}, then off by {:.1e}\n",
@@ -88,7 +88,8 @@ std::string describe(const Predicted& p) {
   text += "  radiosity: " + grid.solve.brief() + "\n";
   if (!p.prediction->bound_is_reliable())
     text += fmt::format(
-        "  error bound: an estimate only, the grid is too coarse ({} elements a surface; {} wanted)\n",
+        "  error bound: an estimate only, the grid is too coarse ({} elements a surface; {} "
+        "wanted)\n",
         grid.mesh.size() / grid.mesh.pieces.size(), Prediction::kPatchesAPiece);
   return text;
 }

@@ -68,15 +68,17 @@ int probe(const ProbeArguments& a) {
     for (std::size_t b = 0; b < bands.size(); ++b) {
       const auto k = static_cast<Eigen::Index>(b);
       const double value = answers[i].value[k], bound = answers[i].error_bound[k];
-      text += fmt::format("\"{}\",{},{:.9g},{:.3g}\n", points[i].name, bands.centre_nm(b), value, bound);
+      text += fmt::format("\"{}\",{},{:.9g},{:.3g}\n", points[i].name, bands.centre_nm(b), value,
+                          bound);
       if (value > 0.0) largest = std::max(largest, bound / value);
     }
   if (a.output.empty()) {
     fmt::print("{}", text);
     return kAgrees;
   }
-  write_file_atomically(a.output, "# quantity: irradiance\n# unit: W m^-2 nm^-1\n# source: truebox, " +
-                                      predicted->scene.path + "\n" + text);
+  write_file_atomically(a.output,
+                        "# quantity: irradiance\n# unit: W m^-2 nm^-1\n# source: truebox, " +
+                            predicted->scene.path + "\n" + text);
   fmt::print("{}{} points, {} bands; largest bound {:.2f} % of its irradiance\n",
              describe(*predicted), points.size(), bands.size(), 100.0 * largest);
   return kAgrees;

@@ -65,14 +65,15 @@ int render_scene(const RenderArguments& a) {
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const double share = mean_share(image);
   add_display_channels(image.radiance, predicted->scene.bands, observer);
-  image.radiance.attributes["source"] = "truebox prediction (simulated) of " + predicted->scene.path;
+  image.radiance.attributes["source"] =
+      "truebox prediction (simulated) of " + predicted->scene.path;
   image.radiance.attributes["errorBound"] = fmt::format("{:.3g} of the mean radiance", share);
   image.error_bound.attributes["source"] = "error bound of " + a.output;
   write_exr(a.output, image.radiance);
   if (!a.error_bound.empty()) write_exr(a.error_bound, image.error_bound);
-  fmt::print("{}  render: {} x {} pixels, {:.2f} s, mean error bound {:.2f} % of the mean radiance\n",
-             describe(*predicted), description.pixels[0], description.pixels[1], seconds,
-             100.0 * share);
+  fmt::print(
+      "{}  render: {} x {} pixels, {:.2f} s, mean error bound {:.2f} % of the mean radiance\n",
+      describe(*predicted), description.pixels[0], description.pixels[1], seconds, 100.0 * share);
   return kAgrees;
 }
 
@@ -83,7 +84,8 @@ void add_render_command(CLI::App& program, Action& chosen) {
   auto arguments = std::make_shared<RenderArguments>();
   add_prediction_options(*command, arguments->prediction);
   command->add_option("--camera", arguments->camera, "name of the camera in the scene");
-  command->add_option("-o,--output", arguments->output, "spectral OpenEXR, with R, G, B")->required();
+  command->add_option("-o,--output", arguments->output, "spectral OpenEXR, with R, G, B")
+      ->required();
   command->add_option("--error-bound", arguments->error_bound,
                       "OpenEXR of the bound of each pixel and band");
   command->add_option("--pixels", arguments->pixels, "width and height instead of the scene's")

@@ -51,7 +51,8 @@ nlohmann::json summary_json(const Predicted& p) {
 
 nlohmann::json solution_json(const Predicted& p) {
   nlohmann::json json = summary_json(p);
-  json["units"] = {{"radiosity", Radiosity::unit()}, {"irradiance", Irradiance::unit()}, {"area", "m^2"}};
+  json["units"] = {
+      {"radiosity", Radiosity::unit()}, {"irradiance", Irradiance::unit()}, {"area", "m^2"}};
   json["band_centres_nm"] = p.scene.bands.centres_nm();
   json["surfaces"] = nlohmann::json::array();
   for (const SurfaceMean& mean : surface_means(*p.prediction))
@@ -66,8 +67,8 @@ nlohmann::json solution_json(const Predicted& p) {
 template <class Write>
 std::string data_array(const char* type, const char* name, int components, const Write& write) {
   std::string text = fmt::format(
-      "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"ascii\">\n", type, name,
-      components);
+      "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"ascii\">\n", type,
+      name, components);
   write(text);
   return text + "</DataArray>\n";
 }
@@ -114,7 +115,8 @@ std::string solution_vtu(const Predicted& p) {
 void print_surfaces(const Predicted& p) {
   const std::size_t bands = p.scene.bands.size();
   const std::vector<std::size_t> shown =
-      bands < 3 ? std::vector<std::size_t>{0} : std::vector<std::size_t>{bands / 4, bands / 2, 3 * bands / 4};
+      bands < 3 ? std::vector<std::size_t>{0}
+                : std::vector<std::size_t>{bands / 4, bands / 2, 3 * bands / 4};
   fmt::print("{:<20}", "mean radiosity of");
   for (std::size_t b : shown) fmt::print("{:>14.0f} nm{:>10}", p.scene.bands.centre_nm(b), "bound");
   fmt::print("   ({})\n", Radiosity::unit());
@@ -122,7 +124,8 @@ void print_surfaces(const Predicted& p) {
     fmt::print("{:<20}", mean.surface);
     for (std::size_t b : shown) {
       const auto k = static_cast<Eigen::Index>(b);
-      const double share = mean.radiosity[k] > 0 ? mean.radiosity_bound[k] / mean.radiosity[k] : 0.0;
+      const double share =
+          mean.radiosity[k] > 0 ? mean.radiosity_bound[k] / mean.radiosity[k] : 0.0;
       fmt::print("{:>17.6g}{:>8.2f} %", mean.radiosity[k], 100.0 * share);
     }
     fmt::print("\n");
@@ -141,7 +144,8 @@ int solve(const SolveArguments& a) {
     return kNotSolved;
   }
   print_surfaces(*predicted);
-  if (extension == ".json") write_file_atomically(a.output, solution_json(*predicted).dump(1) + "\n");
+  if (extension == ".json")
+    write_file_atomically(a.output, solution_json(*predicted).dump(1) + "\n");
   if (extension == ".vtu") write_file_atomically(a.output, solution_vtu(*predicted));
   if (!a.summary.empty()) write_file_atomically(a.summary, summary_json(*predicted).dump(1) + "\n");
   return kAgrees;

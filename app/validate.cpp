@@ -49,16 +49,17 @@ void print(const std::vector<AccuracyCheck>& checks, bool details) {
       failed += !c->passed();
     }
     std::sort(digits.begin(), digits.end());
-    fmt::print("{:<12}{:>7}{:>8}{:>14.1f}{:>14.1f}\n", group, members.size(), failed, digits.front(),
-               digits[digits.size() / 2]);
+    fmt::print("{:<12}{:>7}{:>8}{:>14.1f}{:>14.1f}\n", group, members.size(), failed,
+               digits.front(), digits[digits.size() / 2]);
   }
   for (const AccuracyCheck& c : checks)
     if (details || !c.passed())
-      fmt::print("{} {}: {}: {:.12g}, certified {:.12g}, {:.1f} digits, differs by {:.2g}, allowed "
-                 "{:.2g} {} ({})\n",
-                 c.passed() ? "  ok  " : "FAILED", c.group, c.name, c.computed, c.certified,
-                 matching_digits(c.computed, c.certified), std::abs(c.computed - c.certified),
-                 c.allowed, c.unit, c.reason);
+      fmt::print(
+          "{} {}: {}: {:.12g}, certified {:.12g}, {:.1f} digits, differs by {:.2g}, allowed "
+          "{:.2g} {} ({})\n",
+          c.passed() ? "  ok  " : "FAILED", c.group, c.name, c.computed, c.certified,
+          matching_digits(c.computed, c.certified), std::abs(c.computed - c.certified), c.allowed,
+          c.unit, c.reason);
 }
 
 int validate(const ValidateArguments& a) {

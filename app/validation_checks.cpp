@@ -35,11 +35,11 @@ std::vector<AccuracyCheck> run_validation(const std::filesystem::path& dir, cons
 std::vector<Check> report_checks(const std::vector<AccuracyCheck>& checks) {
   std::vector<Check> list;
   for (const AccuracyCheck& c : checks)
-    list.push_back({c.group + ": " + c.name, c.passed() ? Agreement::agrees : Agreement::fails,
-                    std::abs(c.computed - c.certified), c.allowed, c.unit,
-                    fmt::format("computed {:.12g}, certified {:.12g}, {:.1f} digits; allowed: {}",
-                                c.computed, c.certified, matching_digits(c.computed, c.certified),
-                                c.reason)});
+    list.push_back(
+        {c.group + ": " + c.name, c.passed() ? Agreement::agrees : Agreement::fails,
+         std::abs(c.computed - c.certified), c.allowed, c.unit,
+         fmt::format("computed {:.12g}, certified {:.12g}, {:.1f} digits; allowed: {}", c.computed,
+                     c.certified, matching_digits(c.computed, c.certified), c.reason)});
   return list;
 }
 

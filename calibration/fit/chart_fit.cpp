@@ -167,9 +167,8 @@ Eigen::MatrixXd jacobian(ceres::Problem& problem, const Free& free,
 std::string described_direction(const Eigen::VectorXd& direction, const Free& free) {
   std::vector<int> order(static_cast<std::size_t>(direction.size()));
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
-  std::sort(order.begin(), order.end(), [&](int a, int b) {
-    return std::abs(direction[a]) > std::abs(direction[b]);
-  });
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return std::abs(direction[a]) > std::abs(direction[b]); });
   std::ostringstream text;
   const std::size_t shown = std::min<std::size_t>(4, order.size());
   for (std::size_t i = 0; i < shown; ++i)
@@ -194,8 +193,8 @@ Eigen::MatrixXd covariance(const Eigen::MatrixXd& j, const Free& free, FitSummar
     summary.null_direction = described_direction(direction, free);
     return {};
   }
-  const Eigen::MatrixXd scaled_inverse = eigen.eigenvectors() * values.cwiseInverse().asDiagonal() *
-                                         eigen.eigenvectors().transpose();
+  const Eigen::MatrixXd scaled_inverse =
+      eigen.eigenvectors() * values.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
   return norms.cwiseInverse().asDiagonal() * scaled_inverse * norms.cwiseInverse().asDiagonal();
 }
 
@@ -252,8 +251,8 @@ ChartFit fit_chart(const ChartProblem& problem, const ChartFitOptions& options) 
   FitSummary& summary = fit.summary;
   summary.iterations = static_cast<int>(report.iterations.size());
   summary.observations = static_cast<std::size_t>(report.num_residuals);
-  summary.outcome = report.termination_type == ceres::CONVERGENCE ? Outcome::converged
-                                                                  : Outcome::not_converged;
+  summary.outcome =
+      report.termination_type == ceres::CONVERGENCE ? Outcome::converged : Outcome::not_converged;
   if (!summary.usable()) summary.message = report.message;
   for (double rho : at.rho) {
     fit.reflectance.push_back({rho, 0.0});

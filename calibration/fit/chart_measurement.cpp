@@ -71,8 +71,8 @@ double mean_reflectance(const std::vector<ChartFit>& fits, std::size_t p) {
 
 /// Half the range over the field orders: the data do not decide between them.
 double order_spread(const std::vector<ChartFit>& fits, std::size_t p) {
-  const auto [low, high] = std::minmax_element(
-      fits.begin(), fits.end(), [p](const ChartFit& a, const ChartFit& b) {
+  const auto [low, high] =
+      std::minmax_element(fits.begin(), fits.end(), [p](const ChartFit& a, const ChartFit& b) {
         return a.reflectance[p].value < b.reflectance[p].value;
       });
   return 0.5 * (high->reflectance[p].value - low->reflectance[p].value);
@@ -99,8 +99,8 @@ PatchReading read_patch(const BandContext& context, const BandMeasurement& band,
   budget.add("veil left out", band.veil_kept || !all_usable(other)
                                   ? 0.0
                                   : 0.5 * std::abs(mean_reflectance(other, p) - measured));
-  budget.add("camera response", context.instrument.curvature_scatter_per_dn * kTypicalReading_dn *
-                                    measured);
+  budget.add("camera response",
+             context.instrument.curvature_scatter_per_dn * kTypicalReading_dn * measured);
   reading.measured = {measured, reading.at_bound ? 0.0 : budget.combined()};
   auto& known = reading.reference_budget;
   known.add("spectrometer", spectrometer_u(context.file.known, reference.value));
@@ -133,8 +133,8 @@ SiteEvidence site_evidence(const BandContext& context, const BandMeasurement& ba
                            const std::vector<BandReflectance>& reference) {
   SiteEvidence evidence{.site = site, .used = site == band.site};
   const auto problem = make_problem(context, band.merge.photograph, site, reference);
-  const ChartFit fit = fit_chart(problem, {.field_order = context.file.fit.field_orders[0],
-                                           .fit_veil = band.veil_kept});
+  const ChartFit fit = fit_chart(
+      problem, {.field_order = context.file.fit.field_orders[0], .fit_veil = band.veil_kept});
   for (const PatchBlock& b : problem.blocks)
     if (problem.standards[b.patch])
       evidence.white_dn = std::max(evidence.white_dn, b.value * band.merge.photograph.longest_s);

@@ -40,9 +40,9 @@ struct PatchReading {
 /// How well the standards fit when only photosites of this colour are used (first field order).
 struct SiteEvidence {
   char site = 'G';
-  double white_dn = 0.0;        ///< signal of the brightest standard in the longest exposure, DN
-  double standards_rms = 0.0;   ///< of fitted minus known reflectance of the standards
-  double held_out_rms = 0.0;    ///< of fitted minus reference of the other patches
+  double white_dn = 0.0;       ///< signal of the brightest standard in the longest exposure, DN
+  double standards_rms = 0.0;  ///< of fitted minus known reflectance of the standards
+  double held_out_rms = 0.0;   ///< of fitted minus reference of the other patches
   bool used = false;
 };
 
@@ -71,11 +71,11 @@ struct BandMeasurement {
 
   Outcome outcome = Outcome::not_run;  ///< the worst of the fits
   // Held-out patches only, the standards left out:
-  double rms = 0.0;                 ///< of measured minus reference
-  double rms_measured_centre = 0.0; ///< had the transmission been taken as measured, unshifted
-  double largest_en = 0.0;          ///< of |E_n|
+  double rms = 0.0;                  ///< of measured minus reference
+  double rms_measured_centre = 0.0;  ///< had the transmission been taken as measured, unshifted
+  double largest_en = 0.0;           ///< of |E_n|
   std::size_t agreeing = 0, held_out = 0;
-  double chi2_per_dof = 0.0;        ///< largest of the fits
+  double chi2_per_dof = 0.0;  ///< largest of the fits
 };
 
 struct ChartMeasurement {
@@ -84,8 +84,8 @@ struct ChartMeasurement {
   InstrumentEstimate instrument;
   std::vector<BandMeasurement> bands;
 
-  Outcome outcome() const;        ///< the worst of the bands
-  std::size_t agreeing() const;   ///< held-out patches with |E_n| <= 1, all bands
+  Outcome outcome() const;       ///< the worst of the bands
+  std::size_t agreeing() const;  ///< held-out patches with |E_n| <= 1, all bands
   std::size_t held_out() const;
 };
 

@@ -48,8 +48,7 @@ double centroid_nm(const TabulatedSpectrum& spectrum) {
 BandPass band_pass(const BandFiles& files, double centre_uncertainty_nm) {
   const TableFile table = read_table(files.transmission_path);
   require_provenance(table, Use::input);
-  const TabulatedSpectrum measured =
-      peak_of(spectrum_from_table(table, files.transmission_column));
+  const TabulatedSpectrum measured = peak_of(spectrum_from_table(table, files.transmission_column));
   BandPass band;
   band.measured_centre_nm = centroid_nm(measured);
   band.stated_centre_nm = files.stated_centre_nm;

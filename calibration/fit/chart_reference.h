@@ -16,7 +16,7 @@ namespace truebox {
 /// truth lies between: the centre is the middle, its uncertainty that of a rectangle as wide as the
 /// two are apart, combined with the file's centre_uncertainty_nm (lamp x sensor unknown).
 struct BandPass {
-  TabulatedSpectrum transmission;  ///< shifted; only +-20 nm about the peak
+  TabulatedSpectrum transmission;   ///< shifted; only +-20 nm about the peak
   double measured_centre_nm = 0.0;  ///< centroid of the transmission as measured
   double stated_centre_nm = 0.0;
   Estimate centre_nm;

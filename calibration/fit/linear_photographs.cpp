@@ -140,8 +140,8 @@ LinearPhotographs merge_photographs(const MeasurementFile& file, const Chart& ch
   for (std::size_t b = 0; b < frames.size(); ++b) {
     tell("merge " + file.bands[b].name,
          0.35 + 0.25 * static_cast<double>(b) / static_cast<double>(frames.size()));
-    options.linearity_mask = inner_photosites(labels, chart.width, file.instrument.bayer,
-                                              file.bands[b].site);
+    options.linearity_mask =
+        inner_photosites(labels, chart.width, file.instrument.bayer, file.bands[b].site);
     linear.bands.push_back(
         merge_exposures(frames[b], linear.instrument.darks, file.instrument.bayer, options));
     linear.bands.back().photograph.band = file.bands[b].name;

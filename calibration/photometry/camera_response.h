@@ -15,8 +15,8 @@ struct CameraResponse {
   Estimate offset_dn;
   Estimate curvature_per_dn;
 
-  double linear_dn(double reading_dn) const;   ///< x of a reading; monotone, 0 at offset
-  double slope(double signal_dn) const;        ///< d reading / d x
+  double linear_dn(double reading_dn) const;  ///< x of a reading; monotone, 0 at offset
+  double slope(double signal_dn) const;       ///< d reading / d x
   double reading_dn(double signal_dn) const;
 };
 

@@ -29,8 +29,8 @@ double variance_dn2(const Reading& reading, double expected_dn, const MergeOptio
   return (options.noise.variance_dn2(expected_dn) + reading.dark_variance_dn2) / (slope * slope);
 }
 
-Rate weighted_rate(const std::vector<Reading>& readings, const std::vector<char>& use,
-                   double guess, const MergeOptions& options) {
+Rate weighted_rate(const std::vector<Reading>& readings, const std::vector<char>& use, double guess,
+                   const MergeOptions& options) {
   Rate rate;
   double top = 0.0, bottom = 0.0;
   for (std::size_t i = 0; i < readings.size(); ++i) {

@@ -31,8 +31,8 @@ std::vector<NoiseSample> second_difference_noise(const Frame& frame, const Bayer
   std::vector<NoiseSample> samples;
   for (const Sums& s : sums)
     if (s.n >= 30 && s.top < saturation_dn && s.reading > 3.0 * static_cast<double>(s.n))
-      samples.push_back({s.reading / static_cast<double>(s.n),
-                         s.square / (6.0 * static_cast<double>(s.n)), s.n});
+      samples.push_back(
+          {s.reading / static_cast<double>(s.n), s.square / (6.0 * static_cast<double>(s.n)), s.n});
   return samples;
 }
 

@@ -8,7 +8,7 @@ namespace truebox {
 /// How often an interval held the truth, with the range that this many trials leave open.
 struct Coverage {
   double fraction = 0.0;
-  double low = 0.0;   ///< Wilson score interval
+  double low = 0.0;  ///< Wilson score interval
   double high = 1.0;
 };
 

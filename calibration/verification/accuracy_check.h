@@ -10,8 +10,8 @@ namespace truebox {
 
 class Prediction;
 
-/// A number of the program against the number it should be. `allowed` is what the two may differ by,
-/// in the quantity's unit, and `reason` says where that comes from.
+/// A number of the program against the number it should be. `allowed` is what the two may differ
+/// by, in the quantity's unit, and `reason` says where that comes from.
 struct AccuracyCheck {
   std::string group;  ///< "viewfactors", "furnace", ...
   std::string name;

@@ -39,10 +39,11 @@ Scene plates_scene(double edge_m, double gap_m) {
 
 Scene downlight_scene(const Vec3& c, double a, double exitance) {
   Scene scene = empty_scene(exitance);
-  add(scene, "light", {{c.x(), c.y(), c.z()},
-                       {c.x(), c.y() + a, c.z()},
-                       {c.x() + a, c.y() + a, c.z()},
-                       {c.x() + a, c.y(), c.z()}});
+  add(scene, "light",
+      {{c.x(), c.y(), c.z()},
+       {c.x(), c.y() + a, c.z()},
+       {c.x() + a, c.y() + a, c.z()},
+       {c.x() + a, c.y(), c.z()}});
   return scene;
 }
 

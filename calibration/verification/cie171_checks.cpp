@@ -63,8 +63,7 @@ double internal_reflected_component(double rho) {
   options.relative_bound = 1e-13;
   solve_radiosity(factors, BandMatrix::Constant(n, 1, rho), source, options, b);
   double sum = 0.0;
-  for (Eigen::Index i = 0; i < n; ++i)
-    sum += factors.area_m2[i] * (b(i, 0) - source(i, 0)) / rho;
+  for (Eigen::Index i = 0; i < n; ++i) sum += factors.area_m2[i] * (b(i, 0) - source(i, 0)) / rho;
   return sum / factors.area_m2.sum();
 }
 
@@ -79,15 +78,21 @@ std::vector<AccuracyCheck> check_cie171(const std::filesystem::path& reference_d
   const Scene point_source =
       downlight_scene({-0.5 * kPointEdge_m, -0.5 * kPointEdge_m, 3.0}, kPointEdge_m,
                       std::numbers::pi * 1000.0 / (kPointEdge_m * kPointEdge_m));
-  // 5.3: a luminous square of 1 m, 1000 cd m^-2, in the middle of the ceiling of a 4 x 4 x 3 m room.
+  // 5.3: a luminous square of 1 m, 1000 cd m^-2, in the middle of the ceiling of a 4 x 4 x 3 m
+  // room.
   const Scene area_source = downlight_scene({1.5, 1.5, 3.0}, 1.0, std::numbers::pi * 1000.0);
   // 5.6: the floor of that room sends E_hz rho, of which 100 %.
   const Scene floor = bright_floor_scene(4.0, 100.0);
   std::vector<AccuracyCheck> checks;
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
     const std::string& name = table.rows[row][0];
-    AccuracyCheck check{"cie171", name + ", " + table.rows[row][1], 0.0, table.number(row, exact),
-                        0.0, table.rows[row][unit], "closed form, 1e-9 relative"};
+    AccuracyCheck check{"cie171",
+                        name + ", " + table.rows[row][1],
+                        0.0,
+                        table.number(row, exact),
+                        0.0,
+                        table.rows[row][unit],
+                        "closed form, 1e-9 relative"};
     if (name.starts_with("5.2")) {
       check.computed = direct_at(point_source, position(table.rows[row][2]), Vec3::UnitZ());
     } else if (name.starts_with("5.3")) {

@@ -22,7 +22,8 @@ std::vector<AccuracyCheck> check_cornell_box_probes(const std::filesystem::path&
                                                     const Prediction& prediction) {
   const Scene& scene = prediction.scene();
   const TableFile points = read_table(reference_dir / "independent_renders" / "probe_points.csv");
-  const TableFile truth = read_table(reference_dir / "independent_renders" / "probe_irradiance.csv");
+  const TableFile truth =
+      read_table(reference_dir / "independent_renders" / "probe_irradiance.csv");
   require_provenance(truth);
   std::vector<AccuracyCheck> checks;
   for (std::size_t i = 0; i < points.rows.size(); ++i) {
@@ -38,12 +39,12 @@ std::vector<AccuracyCheck> check_cornell_box_probes(const std::filesystem::path&
       for (std::size_t b = 0; b < scene.bands.size(); ++b) {
         if (std::abs(scene.bands.centre_nm(b) - nm) > 1e-6) continue;
         const auto k = static_cast<Eigen::Index>(b);
-        checks.push_back({"cornellbox", points.rows[i][0] + ", " + truth.rows[row][1] + " nm",
-                          e.value[k], truth.number(row, 2),
-                          e.error_bound[k] + 3.0 * truth.number(row, 3), "W m^-2 nm^-1",
-                          "own bound " + std::to_string(100.0 * e.error_bound[k] /
-                                                        std::max(1e-300, e.value[k])) +
-                              " % + 3 standard errors of the path tracer"});
+        checks.push_back(
+            {"cornellbox", points.rows[i][0] + ", " + truth.rows[row][1] + " nm", e.value[k],
+             truth.number(row, 2), e.error_bound[k] + 3.0 * truth.number(row, 3), "W m^-2 nm^-1",
+             "own bound " +
+                 std::to_string(100.0 * e.error_bound[k] / std::max(1e-300, e.value[k])) +
+                 " % + 3 standard errors of the path tracer"});
       }
     }
   }

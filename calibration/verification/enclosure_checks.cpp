@@ -53,11 +53,12 @@ std::vector<AccuracyCheck> check_furnace(const std::filesystem::path& reference_
                                        std::pair{SolveMethod::gauss_seidel, "Gauss-Seidel"}}) {
       if (method == SolveMethod::gauss_seidel && rho > 0.9999) continue;  // 1e7 sweeps
       BandMatrix b;
-      const auto summary =
-          solve_radiosity(factors, BandMatrix::Constant(n, 1, rho), BandMatrix::Ones(n, 1),
-                          tight(method, rho), b);
-      AccuracyCheck check{"furnace", "rho = " + std::to_string(rho) + ", " + name, 0.0,
-                          1.0 / (1.0 - rho), 0.0, "W m^-2 nm^-1", {}};
+      const auto summary = solve_radiosity(factors, BandMatrix::Constant(n, 1, rho),
+                                           BandMatrix::Ones(n, 1), tight(method, rho), b);
+      AccuracyCheck check{"furnace", "rho = " + std::to_string(rho) + ", " + name,
+                          0.0,       1.0 / (1.0 - rho),
+                          0.0,       "W m^-2 nm^-1",
+                          {}};
       check.computed = b(0, 0);
       for (Eigen::Index i = 0; i < n; ++i)
         if (std::abs(b(i, 0) - check.certified) > std::abs(check.computed - check.certified))
@@ -84,9 +85,12 @@ std::vector<AccuracyCheck> check_infinite_plates(const std::filesystem::path& re
     BandMatrix rho(2, 1), source(2, 1), b;
     rho << parameter(table, row, "rho1"), parameter(table, row, "rho2");
     source << parameter(table, row, "E1"), parameter(table, row, "E2");
-    solve_radiosity(factors, rho, source, tight(SolveMethod::conjugate_gradient, rho.maxCoeff()), b);
-    AccuracyCheck check{"plates", table.rows[row][1] + ", " + table.rows[row][2], 0.0,
-                        table.number(row, value), 0.0, "W m^-2 nm^-1", {}};
+    solve_radiosity(factors, rho, source, tight(SolveMethod::conjugate_gradient, rho.maxCoeff()),
+                    b);
+    AccuracyCheck check{"plates", table.rows[row][1] + ", " + table.rows[row][2],
+                        0.0,      table.number(row, value),
+                        0.0,      "W m^-2 nm^-1",
+                        {}};
     check.computed = b(table.rows[row][2] == "B1" ? 0 : 1, 0);
     // Plates of edge 1 at gap g lose about 2 g of their view; the loss is amplified by 1/(1 - rho).
     check.allowed = 4.0 * kGap / (1.0 - rho.maxCoeff()) * std::abs(b.maxCoeff());
@@ -127,8 +131,10 @@ std::vector<AccuracyCheck> check_ceiling_lit_cube(const std::filesystem::path& r
         sum += b(i, 0) * mesh.patches[i].area_m2;
         area += mesh.patches[i].area_m2;
       }
-      AccuracyCheck check{"cube", table.rows[row][1] + ", " + quantity, sum / area,
-                          table.number(row, value), 0.0, "W m^-2 nm^-1", {}};
+      AccuracyCheck check{"cube",     table.rows[row][1] + ", " + quantity,
+                          sum / area, table.number(row, value),
+                          0.0,        "W m^-2 nm^-1",
+                          {}};
       check.allowed = 1e-10 * check.certified;
       check.reason = "same discrete equations, 11 digits certified";
       checks.push_back(std::move(check));

@@ -12,11 +12,11 @@ namespace truebox {
 /// error is positive.
 struct RenderAgreement {
   std::size_t samples = 0;
-  std::size_t outside = 0;   ///< |difference| > bound + 3 standard errors
-  double mean_z = 0.0;       ///< of difference / standard error
+  std::size_t outside = 0;  ///< |difference| > bound + 3 standard errors
+  double mean_z = 0.0;      ///< of difference / standard error
   double rms_z = 0.0;
-  double mean_bound = 0.0;   ///< mean bound / mean radiance
-  double bias = 0.0;         ///< (sum of values / sum of reference) - 1
+  double mean_bound = 0.0;  ///< mean bound / mean radiance
+  double bias = 0.0;        ///< (sum of values / sum of reference) - 1
 
   double share_outside() const {
     return samples ? static_cast<double>(outside) / static_cast<double>(samples) : 1.0;

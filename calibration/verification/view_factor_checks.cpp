@@ -42,10 +42,13 @@ std::vector<Region> read_regions(const std::string& text) {
   bool is_hole = false;
   while (at != std::string::npos) {
     Polygon polygon = read_polygon(text, at);
-    if (is_hole) regions.back().holes.push_back(std::move(polygon));
-    else regions.push_back({std::move(polygon), {}});
+    if (is_hole)
+      regions.back().holes.push_back(std::move(polygon));
+    else
+      regions.push_back({std::move(polygon), {}});
     const std::size_t next = text.find('[', at);
-    is_hole = next != std::string::npos && text.substr(at, next - at).find('|') != std::string::npos;
+    is_hole =
+        next != std::string::npos && text.substr(at, next - at).find('|') != std::string::npos;
     at = next;
   }
   return regions;
@@ -53,8 +56,7 @@ std::vector<Region> read_regions(const std::string& text) {
 
 // The table gives outlines, not sides: each is turned to face the other.
 void face(Region& a, const Vec3& point) {
-  if (plane_of(a.outline).distance_m(point) < 0.0)
-    std::reverse(a.outline.begin(), a.outline.end());
+  if (plane_of(a.outline).distance_m(point) < 0.0) std::reverse(a.outline.begin(), a.outline.end());
 }
 
 double exchange_of(const Region& a, const Region& b) {

@@ -16,10 +16,10 @@ struct Instrument {
   std::string camera;
   int bits = 8;
   BayerPattern bayer;
-  double saturation_dn = 0.0;          ///< readings at or above it are not used
-  double floor_dn = 0.0;               ///< readings below it are not used
-  std::optional<double> gain_dn;       ///< variance per signal, DN
-  std::optional<double> read_noise_dn; ///< standard deviation, quantisation excluded
+  double saturation_dn = 0.0;           ///< readings at or above it are not used
+  double floor_dn = 0.0;                ///< readings below it are not used
+  std::optional<double> gain_dn;        ///< variance per signal, DN
+  std::optional<double> read_noise_dn;  ///< standard deviation, quantisation excluded
 };
 
 struct FrameFile {
@@ -34,12 +34,12 @@ struct DarkFiles {
 
 /// One spectral band: its filter, the photosites that see it best, its exposures.
 struct BandFiles {
-  std::string name;                 ///< "450 nm"
-  char site = 'G';                  ///< 'R', 'G' or 'B'
-  std::string transmission_path;    ///< table of the filter's measured transmission
+  std::string name;               ///< "450 nm"
+  char site = 'G';                ///< 'R', 'G' or 'B'
+  std::string transmission_path;  ///< table of the filter's measured transmission
   std::string transmission_column;
-  double stated_centre_nm = 0.0;    ///< the maker's
-  std::string note;                 ///< why this site, for the report; may be empty
+  double stated_centre_nm = 0.0;  ///< the maker's
+  std::string note;               ///< why this site, for the report; may be empty
   std::vector<FrameFile> photographs;
 };
 

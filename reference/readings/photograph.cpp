@@ -20,12 +20,9 @@ Image to_image(const Photograph& photograph) {
   image.add_channel("variance").samples = photograph.variance;
   auto& exposures = image.add_channel("exposures").samples;
   exposures.assign(photograph.exposures_used.begin(), photograph.exposures_used.end());
-  image.attributes = {{"unit:value", "DN s^-1"},
-                      {"unit:variance", "DN^2 s^-2"},
-                      {"unit:exposures", "1"},
-                      {"bayer", photograph.bayer.name()},
-                      {"band", photograph.band},
-                      {"source", photograph.provenance.source}};
+  image.attributes = {{"unit:value", "DN s^-1"}, {"unit:variance", "DN^2 s^-2"},
+                      {"unit:exposures", "1"},   {"bayer", photograph.bayer.name()},
+                      {"band", photograph.band}, {"source", photograph.provenance.source}};
   return image;
 }
 

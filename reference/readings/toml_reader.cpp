@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "readings/toml_reader.h"
 
+#include <toml++/toml.h>
+
 #include <cmath>
 #include <set>
 #include <sstream>
-#include <toml++/toml.h>
 
 #include "radiometry/input_error.h"
 
@@ -139,8 +140,7 @@ std::vector<int> TomlTable::integers(const std::string& key, int low, int high) 
 
 TomlTable TomlTable::table(const std::string& key) {
   const toml::node* node = state_->find(key);
-  if (!node || !node->is_table())
-    fail(key, "a table", node ? described(*node) : "no such key");
+  if (!node || !node->is_table()) fail(key, "a table", node ? described(*node) : "no such key");
   auto state = std::make_unique<State>();
   state->path = state_->path;
   state->root = state_->root;

@@ -58,10 +58,19 @@ std::optional<std::size_t> band_at(const SpectralChannels& bands, double nm, dou
 
 std::vector<Pair> match_bands(const Image& test, const Image& reference,
                               const DifferenceOptions& options) {
-  const SpectralChannels t = spectral_channels(test), r = spectral_channels(reference);
-  if (t.indices.size() != r.indices.size())
+  const SpectralChannels t = spectral_channels(test);
+  SpectralChannels r = spectral_channels(reference);
+  if (options.band_nm) {  // the others need not match: the reference may hold a few bands only
+    std::size_t nearest = 0;
+    for (std::size_t i = 1; i < r.indices.size(); ++i)
+      if (std::abs(r.wavelengths_nm[i] - *options.band_nm) <
+          std::abs(r.wavelengths_nm[nearest] - *options.band_nm))
+        nearest = i;
+    r = {{r.indices[nearest]}, {r.wavelengths_nm[nearest]}};
+  } else if (t.indices.size() != r.indices.size()) {
     throw MismatchError(
         fmt::format("the test has {}, the reference has {}", bands_text(t), bands_text(r)));
+  }
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i < r.indices.size(); ++i) {
     const auto found = band_at(t, r.wavelengths_nm[i], options.wavelength_tolerance_nm);
@@ -91,14 +100,7 @@ std::vector<Pair> match(const Image& test, const Image& reference,
   if (!spectral && !spectral_channels(test).indices.empty() && options.band_nm)
     throw MismatchError("the reference has no spectral band, so --band cannot choose one");
   if (!spectral || spectral_channels(test).indices.empty()) return match_names(test, reference);
-  auto pairs = match_bands(test, reference, options);
-  if (!options.band_nm) return pairs;
-  const Pair* nearest = &pairs.front();
-  for (const Pair& pair : pairs)
-    if (std::abs(pair.wavelength_nm - *options.band_nm) <
-        std::abs(nearest->wavelength_nm - *options.band_nm))
-      nearest = &pair;
-  return {*nearest};
+  return match_bands(test, reference, options);
 }
 
 /// The uncertainty that belongs to a channel: same band, else same name.

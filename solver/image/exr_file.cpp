@@ -18,10 +18,10 @@ namespace truebox {
 namespace {
 
 Imf::Slice float_slice(const float* samples, const Imath::Box2i& window, int width) {
-  const std::ptrdiff_t offset =
-      window.min.x + static_cast<std::ptrdiff_t>(window.min.y) * width;
+  const std::ptrdiff_t offset = window.min.x + static_cast<std::ptrdiff_t>(window.min.y) * width;
   char* base = reinterpret_cast<char*>(const_cast<float*>(samples) - offset);
-  return Imf::Slice(Imf::FLOAT, base, sizeof(float), sizeof(float) * static_cast<std::size_t>(width));
+  return Imf::Slice(Imf::FLOAT, base, sizeof(float),
+                    sizeof(float) * static_cast<std::size_t>(width));
 }
 
 }  // namespace

@@ -10,9 +10,9 @@
 
 namespace truebox {
 
-/// Reads EXR (half or float; first part), PNG (8 or 16 bit) or TIFF (8 or 16 bit, float), by content.
-/// Integer samples keep their digital numbers (DN), nothing is linearised or scaled; palette PNGs
-/// keep their indices. InputError: missing, truncated, or of another kind.
+/// Reads EXR (half or float; first part), PNG (8 or 16 bit) or TIFF (8 or 16 bit, float), by
+/// content. Integer samples keep their digital numbers (DN), nothing is linearised or scaled;
+/// palette PNGs keep their indices. InputError: missing, truncated, or of another kind.
 Image read_image(const std::filesystem::path& path);
 
 /// Writes float32 OpenEXR (ZIP), text attributes included. The file appears under its final name

@@ -48,7 +48,8 @@ Image codecs::read_png(const std::filesystem::path& path) try {
   png_read_image(reader.png, rows.data());
   png_read_end(reader.png, nullptr);
 
-  static const char* const kNames[4][4] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
+  static const char* const kNames[4][4] = {
+      {"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
   for (int c = 0; c < planes; ++c) image.add_channel(kNames[planes - 1][c]);
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)

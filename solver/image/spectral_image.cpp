@@ -61,7 +61,8 @@ void add_display_channels(Image& image, const WavelengthGrid& grid, const Observ
   }
   for (auto& channel : rgb) image.channels.push_back(std::move(channel));
   image.attributes["spectralLayoutVersion"] = "1.0";
-  image.attributes["emissiveUnits"] = "W.m^-2.sr^-1";  // the layout's own wording; "unit" says per nm
+  image.attributes["emissiveUnits"] =
+      "W.m^-2.sr^-1";  // the layout's own wording; "unit" says per nm
   image.attributes["colorInteropID"] = "lin_rec709_scene";
 }
 

@@ -25,8 +25,9 @@ float sample(const unsigned char* row, std::size_t i, int bits, bool is_float) {
   switch (bits) {
     case 8: return row[i];
     case 16: return reinterpret_cast<const std::uint16_t*>(row)[i];
-    default: return is_float ? reinterpret_cast<const float*>(row)[i]
-                             : static_cast<float>(reinterpret_cast<const std::uint32_t*>(row)[i]);
+    default:
+      return is_float ? reinterpret_cast<const float*>(row)[i]
+                      : static_cast<float>(reinterpret_cast<const std::uint32_t*>(row)[i]);
   }
 }
 
@@ -59,7 +60,8 @@ Image codecs::read_tiff(const std::filesystem::path& path) try {
     throw InputError(path.string(), 0, "1 to 2^28 pixels",
                      std::to_string(width) + " x " + std::to_string(height));
   Image image(static_cast<int>(width), static_cast<int>(height));
-  static const char* const kNames[4][4] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
+  static const char* const kNames[4][4] = {
+      {"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
   for (int c = 0; c < planes; ++c) image.add_channel(kNames[planes - 1][c]);
   std::vector<unsigned char> row(static_cast<std::size_t>(TIFFScanlineSize(tiff.get())));
   for (std::uint32_t y = 0; y < height; ++y) {

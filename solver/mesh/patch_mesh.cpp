@@ -88,10 +88,16 @@ class VertexPool {
 
 void add_piece(PatchMesh& mesh, const Scene& scene, std::size_t surface, const Polygon& polygon,
                const Subdivision& cut) {
-  Piece piece{surface, polygon, plane_of(polygon), diameter_m(polygon),
-              static_cast<std::uint32_t>(mesh.patches.size()), 0, contact_lines(polygon, scene)};
+  Piece piece{surface,
+              polygon,
+              plane_of(polygon),
+              diameter_m(polygon),
+              static_cast<std::uint32_t>(mesh.patches.size()),
+              0,
+              contact_lines(polygon, scene)};
   VertexPool pool(mesh.vertices, piece);
-  for (const Polygon& cell : cut_along(cells_of(polygon, cut), piece.contacts, piece.plane.normal)) {
+  for (const Polygon& cell :
+       cut_along(cells_of(polygon, cut), piece.contacts, piece.plane.normal)) {
     Patch patch;
     patch.first_corner = static_cast<std::uint32_t>(mesh.corners.size());
     for (const Vec3& v : cell) {

@@ -54,7 +54,8 @@ struct Topology {
 std::vector<std::uint32_t> reachable(const PatchMesh& mesh, const Topology& topology,
                                      const std::vector<char>& usable, std::uint32_t start,
                                      std::uint32_t vertex, int rings) {
-  std::set<std::uint32_t> ring(topology.patches_at[vertex].begin(), topology.patches_at[vertex].end());
+  std::set<std::uint32_t> ring(topology.patches_at[vertex].begin(),
+                               topology.patches_at[vertex].end());
   for (int r = 1; r < rings; ++r) {
     std::set<std::uint32_t> wider = ring;
     for (std::uint32_t p : ring)
@@ -181,7 +182,8 @@ SmoothField::SmoothField(const PatchMesh& mesh, const std::vector<char>& usable,
     bins.patches.resize(static_cast<std::size_t>(bins.columns) * bins.rows);
     for (std::uint32_t p = piece.first_patch; p < piece.first_patch + piece.patch_count; ++p) {
       Eigen::AlignedBox2d extent;
-      for (std::uint32_t v : mesh.corners_of(mesh.patches[p])) extent.extend(flat(mesh.vertices[v]));
+      for (std::uint32_t v : mesh.corners_of(mesh.patches[p]))
+        extent.extend(flat(mesh.vertices[v]));
       const auto bin = [&](double value, double low, int count) {
         return std::clamp(static_cast<int>((value - low) / bins.cell_m), 0, count - 1);
       };
@@ -208,7 +210,8 @@ std::uint32_t SmoothField::find_patch(std::uint32_t piece, const Vec3& point) co
     for (std::size_t k = 0; k < corners.size(); ++k) {
       const Vec3& a = mesh_->vertices[corners[k]];
       const Vec3& b = mesh_->vertices[corners[(k + 1) % corners.size()]];
-      depth = std::min(depth, mesh_->pieces[piece].plane.normal.cross(b - a).normalized().dot(point - a));
+      depth = std::min(depth,
+                       mesh_->pieces[piece].plane.normal.cross(b - a).normalized().dot(point - a));
     }
     if (depth > best) best = depth, nearest = p;
     if (depth >= 0.0) break;
@@ -234,7 +237,8 @@ void SmoothField::evaluate(std::uint32_t patch_index, const Vec3& point,
   for (std::size_t k = 0; k < count; ++k) {
     const Vec3 before = (vertex(k) - vertex(k + n - 1)).normalized();
     const Vec3 after = (vertex(k + 1) - vertex(k)).normalized();
-    lambda[k] = std::max(0.0, normal.dot(before.cross(after))) / (depth[(k + n - 1) % n] * depth[k]);
+    lambda[k] =
+        std::max(0.0, normal.dot(before.cross(after))) / (depth[(k + n - 1) % n] * depth[k]);
     total += lambda[k];
   }
   values.setZero();
@@ -242,9 +246,9 @@ void SmoothField::evaluate(std::uint32_t patch_index, const Vec3& point,
     if (lambda[k] == 0.0) continue;
     const Corner& corner = corners_[corner_of_[patch.first_corner + k]];
     const Vec3 d = (point - corner.origin) / corner.size_m;
-    values.noalias() += lambda[k] / total *
-                        (monomials(d.dot(corner.axis_u), d.dot(corner.axis_v)) * corner.coefficients)
-                            .transpose();
+    values.noalias() +=
+        lambda[k] / total *
+        (monomials(d.dot(corner.axis_u), d.dot(corner.axis_v)) * corner.coefficients).transpose();
   }
   values = values.cwiseMax(0.0);
 }

@@ -21,7 +21,8 @@ using BandMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::
 /// Sources: Wachspress (1975); partition of unity: Babuska & Melenk (1997).
 class SmoothField {
  public:
-  /// `means`: elements x bands; `usable`: one flag an element (a buried one would drag in its dark).
+  /// `means`: elements x bands; `usable`: one flag an element (a buried one would drag in its
+  /// dark).
   SmoothField(const PatchMesh& mesh, const std::vector<char>& usable, const BandMatrix& means);
 
   /// Values in each band at a point of element `patch`; negative overshoot is cut off at 0.

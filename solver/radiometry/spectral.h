@@ -24,11 +24,21 @@ struct Spectral {
 };
 
 // Quantities and units of ISO 80000-7:2019; per-wavelength quantities per nm.
-struct ReflectanceQuantity { static constexpr const char* unit = "1"; };
-struct RadiantExitanceQuantity { static constexpr const char* unit = "W m^-2 nm^-1"; };
-struct RadiosityQuantity { static constexpr const char* unit = "W m^-2 nm^-1"; };
-struct IrradianceQuantity { static constexpr const char* unit = "W m^-2 nm^-1"; };
-struct RadianceQuantity { static constexpr const char* unit = "W m^-2 sr^-1 nm^-1"; };
+struct ReflectanceQuantity {
+  static constexpr const char* unit = "1";
+};
+struct RadiantExitanceQuantity {
+  static constexpr const char* unit = "W m^-2 nm^-1";
+};
+struct RadiosityQuantity {
+  static constexpr const char* unit = "W m^-2 nm^-1";
+};
+struct IrradianceQuantity {
+  static constexpr const char* unit = "W m^-2 nm^-1";
+};
+struct RadianceQuantity {
+  static constexpr const char* unit = "W m^-2 sr^-1 nm^-1";
+};
 
 using Reflectance = Spectral<ReflectanceQuantity>;
 using RadiantExitance = Spectral<RadiantExitanceQuantity>;

@@ -23,8 +23,10 @@ std::vector<std::string> split_cells(const std::string& line) {
   for (std::size_t i = 0; i < line.size(); ++i) {
     const char c = line[i];
     if (c == '"') {
-      if (quoted && i + 1 < line.size() && line[i + 1] == '"') cell += line[++i];
-      else quoted = !quoted;
+      if (quoted && i + 1 < line.size() && line[i + 1] == '"')
+        cell += line[++i];
+      else
+        quoted = !quoted;
     } else if (c == ',' && !quoted) {
       cells.push_back(trimmed(cell));
       cell.clear();

@@ -20,7 +20,7 @@ struct TableFile {
   std::vector<int> row_lines;  ///< line number of each row in the file
 
   bool has_column(const std::string& name) const;
-  std::size_t column_index(const std::string& name) const;  ///< InputError if there is none
+  std::size_t column_index(const std::string& name) const;   ///< InputError if there is none
   double number(std::size_t row, std::size_t column) const;  ///< InputError unless finite
 };
 

@@ -26,8 +26,8 @@ double TabulatedSpectrum::at(double wavelength_nm) const {
   const auto& x = wavelengths_nm_;
   if (wavelength_nm <= x.front()) return values_.front();
   if (wavelength_nm >= x.back()) return values_.back();
-  const std::size_t i = static_cast<std::size_t>(
-      std::upper_bound(x.begin(), x.end(), wavelength_nm) - x.begin());
+  const std::size_t i =
+      static_cast<std::size_t>(std::upper_bound(x.begin(), x.end(), wavelength_nm) - x.begin());
   const double t = (wavelength_nm - x[i - 1]) / (x[i] - x[i - 1]);
   return values_[i - 1] + t * (values_[i] - values_[i - 1]);
 }

@@ -146,8 +146,7 @@ std::vector<Polygon> convex_pieces(const Polygon& outline, const std::vector<Pol
       is_convex(outline, tolerance) ? std::vector<Polygon>{outline} : triangulate(outline);
   for (Polygon hole : holes) {
     if (area_vector(hole).dot(normal) < 0.0) std::reverse(hole.begin(), hole.end());
-    const auto parts =
-        is_convex(hole, tolerance) ? std::vector<Polygon>{hole} : triangulate(hole);
+    const auto parts = is_convex(hole, tolerance) ? std::vector<Polygon>{hole} : triangulate(hole);
     if (parts.empty()) return {};
     for (const Polygon& part : parts) pieces = subtract(pieces, part, normal, tolerance);
   }

@@ -105,14 +105,14 @@ Requirements requirements(const Scene& scene) {
           ? "interreflection: modelled, lit surfaces face each other"
           : "interreflection: left out, no reflecting surface faces another; this is exact");
   needs.reasons.push_back(
-      needs.occlusion ? "occlusion: modelled, a surface has others on both of its sides"
-                      : "occlusion: left out, every surface has the whole scene on one side; exact");
-  needs.reasons.push_back(
-      "bands: " + std::to_string(needs.distinct_bands.size()) + " of " +
-      std::to_string(scene.bands.size()) +
-      " solved" + (needs.distinct_bands.size() < scene.bands.size()
-                       ? ", the others are exact multiples of these"
-                       : ", no two are multiples of each other"));
+      needs.occlusion
+          ? "occlusion: modelled, a surface has others on both of its sides"
+          : "occlusion: left out, every surface has the whole scene on one side; exact");
+  needs.reasons.push_back("bands: " + std::to_string(needs.distinct_bands.size()) + " of " +
+                          std::to_string(scene.bands.size()) + " solved" +
+                          (needs.distinct_bands.size() < scene.bands.size()
+                               ? ", the others are exact multiples of these"
+                               : ", no two are multiples of each other"));
   return needs;
 }
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene/scene_file.h"
 
+#include <toml++/toml.h>
+
 #include <cmath>
 #include <set>
 #include <sstream>
-#include <toml++/toml.h>
 
 #include "radiometry/input_error.h"
 #include "radiometry/table_file.h"
@@ -24,7 +25,7 @@ std::string described(const toml::node& node) {
 // Reads one scene file; keeps the path so that every mistake can name its place.
 class Reader {
  public:
-  explicit Reader(const std::filesystem::path& path) : path_(path) {}
+  explicit Reader(std::filesystem::path path) : path_(std::move(path)) {}
 
   Scene read() {
     const toml::table root = parse();
@@ -56,7 +57,7 @@ class Reader {
     }
   }
 
-  void allow_keys(const toml::table& table, std::set<std::string> known) const {
+  void allow_keys(const toml::table& table, const std::set<std::string>& known) const {
     for (const auto& [key, node] : table) {
       if (known.contains(std::string(key.str()))) continue;
       std::string list;
@@ -105,7 +106,8 @@ class Reader {
   void read_unit(const toml::table& root) {
     static const std::map<std::string, double> kMetres = {
         {"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}, {"in", 0.0254}};
-    const toml::node& node = need(root, "length_unit", "length_unit = \"m\", \"cm\", \"mm\" or \"in\"");
+    const toml::node& node =
+        need(root, "length_unit", "length_unit = \"m\", \"cm\", \"mm\" or \"in\"");
     scene_.length_unit = text(node, "a unit in quotes");
     const auto found = kMetres.find(scene_.length_unit);
     if (found == kMetres.end()) fail(node, "\"m\", \"cm\", \"mm\" or \"in\"", described(node));
@@ -123,7 +125,8 @@ class Reader {
     allow_keys(bands, {"from_nm", "to_nm", "step_nm", "centres_nm"});
     try {
       if (const toml::node* centres = bands.get("centres_nm")) {
-        scene_.bands = WavelengthGrid::from_centres(numbers(*centres, "a list of band centres in nm"));
+        scene_.bands =
+            WavelengthGrid::from_centres(numbers(*centres, "a list of band centres in nm"));
       } else {
         const char* what = "from_nm, to_nm and step_nm, or centres_nm = [...]";
         scene_.bands = WavelengthGrid::uniform(number(need(bands, "from_nm", what)),
@@ -231,7 +234,8 @@ class Reader {
         if (std::abs(plane_of(outline).distance_m(v)) > 1e-9 * diameter_m(outline))
           fail(*table.get("holes"), "holes in the plane of their surface", "a vertex off it");
     auto parts = convex_pieces(outline, holes);
-    if (parts.empty()) fail(node, "an outline that does not cross itself and is not all hole", "neither");
+    if (parts.empty())
+      fail(node, "an outline that does not cross itself and is not all hole", "neither");
     return parts;
   }
 
@@ -290,7 +294,8 @@ class Reader {
                         vector(need(table, "position", "position = [x, y, z]"), "[x, y, z]");
     camera.direction = vector(need(table, "direction", "direction = [x, y, z]"), "[x, y, z]");
     camera.up = vector(need(table, "up", "up = [x, y, z]"), "[x, y, z]");
-    if (camera.direction.cross(camera.up).norm() < 1e-9 * camera.direction.norm() * camera.up.norm())
+    if (camera.direction.cross(camera.up).norm() <
+        1e-9 * camera.direction.norm() * camera.up.norm())
       fail(table, "a direction that is not parallel to up", "parallel vectors");
     const toml::node& focal = need(table, "focal_length_mm", "focal_length_mm = number");
     camera.focal_length_m = 1e-3 * number(focal);
@@ -303,7 +308,8 @@ class Reader {
     const toml::node& grid = need(table, "pixels", "pixels = [width, height]");
     const auto pixels = numbers(grid, "pixels = [width, height]");
     for (double p : pixels)
-      if (p < 1.0 || p > 32768.0 || p != std::floor(p)) fail(grid, "1 to 32768 pixels", described(grid));
+      if (p < 1.0 || p > 32768.0 || p != std::floor(p))
+        fail(grid, "1 to 32768 pixels", described(grid));
     if (pixels.size() != 2) fail(grid, "pixels = [width, height]", described(grid));
     camera.pixels = {static_cast<int>(pixels[0]), static_cast<int>(pixels[1])};
     return camera;

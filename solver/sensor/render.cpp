@@ -53,8 +53,9 @@ class Renderer {
   void add_points(int x, int y, int per_side, PixelSum& pixel, Gather::Scratch& scratch) const {
     const int count = per_side * per_side;
     for (int k = 0; k < count; ++k)
-      add_point({x + (k + 0.5) / count, y + radical_inverse(static_cast<unsigned>(k)) + 0.5 / count},
-                pixel, scratch);
+      add_point(
+          {x + (k + 0.5) / count, y + radical_inverse(static_cast<unsigned>(k)) + 0.5 / count},
+          pixel, scratch);
   }
 
   // Whether a corner of the pixel sees another surface: a sliver that the points may have missed.

@@ -51,23 +51,24 @@ BandMatrix band_product(const Eigen::MatrixXd& symmetric, const BandMatrix& x) {
     for (Eigen::Index k = 0; k < m; ++k)
       packed[static_cast<std::size_t>((k / kBands * n + j) * kBands + k % kBands)] = x(j, k);
   BandMatrix y(n, m);
-  tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, (n + kRows - 1) / kRows, 8),
-                    [&](const auto& range) {
-    double sums[kRows * kBands];
-    // A block of rows stays in cache while the panels pass over it.
-    for (Eigen::Index panel = 0; panel < panels; ++panel)
-      for (Eigen::Index block = range.begin(); block < range.end(); ++block) {
-        const Eigen::Index first = block * kRows;
-        // S is symmetric: its columns are its rows, and contiguous. The last block repeats a row.
-        const auto row = [&](Eigen::Index r) {
-          return symmetric.data() + std::min(first + r, n - 1) * n;
-        };
-        four_rows(row(0), row(1), row(2), row(3), packed.data() + panel * n * kBands, n, sums);
-        for (Eigen::Index r = 0; r < kRows && first + r < n; ++r)
-          for (Eigen::Index k = 0; k < kBands && panel * kBands + k < m; ++k)
-            y(first + r, panel * kBands + k) = sums[r * kBands + k];
-      }
-  });
+  tbb::parallel_for(
+      tbb::blocked_range<Eigen::Index>(0, (n + kRows - 1) / kRows, 8), [&](const auto& range) {
+        double sums[kRows * kBands];
+        // A block of rows stays in cache while the panels pass over it.
+        for (Eigen::Index panel = 0; panel < panels; ++panel)
+          for (Eigen::Index block = range.begin(); block < range.end(); ++block) {
+            const Eigen::Index first = block * kRows;
+            // S is symmetric: its columns are its rows, and contiguous. The last block repeats a
+            // row.
+            const auto row = [&](Eigen::Index r) {
+              return symmetric.data() + std::min(first + r, n - 1) * n;
+            };
+            four_rows(row(0), row(1), row(2), row(3), packed.data() + panel * n * kBands, n, sums);
+            for (Eigen::Index r = 0; r < kRows && first + r < n; ++r)
+              for (Eigen::Index k = 0; k < kBands && panel * kBands + k < m; ++k)
+                y(first + r, panel * kBands + k) = sums[r * kBands + k];
+          }
+      });
   return y;
 }
 

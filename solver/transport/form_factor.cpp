@@ -53,8 +53,8 @@ int gauss_points(double radius, double distance, double tolerance) {
 
 // Integral over a triangle (collapsed Gauss rule) or a convex quad (bilinear Gauss rule) of
 // Lambert's formula; other polygons as a fan of triangles.
-double integrate_quad(const std::array<Vec3, 4>& q, const Vec3& normal, std::span<const Vec3> source,
-                      int points) {
+double integrate_quad(const std::array<Vec3, 4>& q, const Vec3& normal,
+                      std::span<const Vec3> source, int points) {
   const GaussRule& rule = gauss_rule(points);
   double sum = 0.0;
   for (int j = 0; j < points; ++j)
@@ -72,7 +72,8 @@ double integrate_quad(const std::array<Vec3, 4>& q, const Vec3& normal, std::spa
 double lambert_quadrature(const PlanarPolygon& receiver, const PlanarPolygon& source, int points) {
   const Vec3& normal = receiver.plane.normal;
   const Polygon& p = receiver.vertices;
-  if (points == 1) return receiver.area_m2 * contour_sum(receiver.centroid, normal, source.vertices);
+  if (points == 1)
+    return receiver.area_m2 * contour_sum(receiver.centroid, normal, source.vertices);
   if (p.size() == 4)
     return integrate_quad({p[0], p[1], p[2], p[3]}, normal, source.vertices, points);
   double sum = 0.0;
@@ -108,9 +109,8 @@ double outer_integral(const EdgePair& e, double s0, double s1, int depth) {
   const Vec3 middle = 0.5 * (p0 + p1);
   const double radius = 0.5 * (p1 - p0).norm();
   // Between parallel lines only the end points are singular; otherwise the whole segment is.
-  const double distance =
-      e.parallel ? std::min((middle - e.b0).norm(), (middle - e.b1).norm())
-                 : distance_to_segment(middle, e.b0, e.b1);
+  const double distance = e.parallel ? std::min((middle - e.b0).norm(), (middle - e.b1).norm())
+                                     : distance_to_segment(middle, e.b0, e.b1);
   int points = gauss_points(radius, distance, e.tolerance);
   if (points > 12 && depth < 48) {
     const double half = 0.5 * (s0 + s1);
@@ -148,8 +148,8 @@ double double_contour(const PlanarPolygon& first, const PlanarPolygon& second, d
 
 // Both polygons wholly in front of each other. The smaller one receives.
 double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tolerance) {
-  const bool swap = j.radius_m < i.radius_m ||
-                    (j.radius_m == i.radius_m && j.centroid.sum() < i.centroid.sum());
+  const bool swap =
+      j.radius_m < i.radius_m || (j.radius_m == i.radius_m && j.centroid.sum() < i.centroid.sum());
   const PlanarPolygon& receiver = swap ? j : i;
   const PlanarPolygon& source = swap ? i : j;
   double nearest = std::numeric_limits<double>::infinity();
@@ -159,7 +159,8 @@ double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tole
   } else {
     const Polygon& p = source.vertices;
     for (std::size_t k = 0; k < p.size(); ++k)
-      nearest = std::min(nearest, distance_to_segment(receiver.centroid, p[k], p[(k + 1) % p.size()]));
+      nearest =
+          std::min(nearest, distance_to_segment(receiver.centroid, p[k], p[(k + 1) % p.size()]));
   }
   const int points = gauss_points(receiver.radius_m, nearest, tolerance);
   return points <= 8 ? lambert_quadrature(receiver, source, points)

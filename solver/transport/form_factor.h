@@ -28,10 +28,10 @@ struct PlanarPolygon {
 /// other's horizon:
 ///   A_i F_ij = 1/pi integral integral cos_i cos_j / r^2 dA_j dA_i.
 /// Lambert's formula integrated by Gauss quadrature over the smaller polygon where that converges
-/// fast, otherwise the double contour integral 1/(2 pi) oint oint ln r dr_i . dr_j with one integral
-/// in closed form and the other split geometrically towards touching points. Symmetric in its
-/// arguments. `relative_tolerance` >= 1e-13 chooses the quadrature's order.
-/// Sources: Sparrow (1963); Schroeder & Hanrahan (1993).
+/// fast, otherwise the double contour integral 1/(2 pi) oint oint ln r dr_i . dr_j with one
+/// integral in closed form and the other split geometrically towards touching points. Symmetric in
+/// its arguments. `relative_tolerance` >= 1e-13 chooses the quadrature's order. Sources: Sparrow
+/// (1963); Schroeder & Hanrahan (1993).
 double exchange_area_m2(const PlanarPolygon& i, const PlanarPolygon& j, double relative_tolerance);
 
 }  // namespace truebox

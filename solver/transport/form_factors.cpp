@@ -72,7 +72,8 @@ class Builder {
     std::atomic<Eigen::Index> done{0};
     std::mutex progress_lock;
     tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, n, 8), [&](const auto& range) {
-      for (Eigen::Index i = range.begin(); i < range.end(); ++i) fill_row(i, result.exchange_area_m2);
+      for (Eigen::Index i = range.begin(); i < range.end(); ++i)
+        fill_row(i, result.exchange_area_m2);
       const Eigen::Index count = done += range.end() - range.begin();
       if (options_.progress) {
         const std::lock_guard guard(progress_lock);
@@ -91,9 +92,8 @@ class Builder {
     if (result.summary.closed) repair(result);
     result.summary.row_sum_max = 0.0;
     for (Eigen::Index i = 0; i < n; ++i)
-      result.summary.row_sum_max =
-          std::max(result.summary.row_sum_max,
-                   result.exchange_area_m2.col(i).sum() / result.area_m2[i]);
+      result.summary.row_sum_max = std::max(
+          result.summary.row_sum_max, result.exchange_area_m2.col(i).sum() / result.area_m2[i]);
     return result;
   }
 
@@ -270,8 +270,8 @@ class Builder {
       };
       for (int k = 0; k < 16; ++k, ++cast) {
         const double r2 = random(), phi = 2.0 * std::numbers::pi * random();
-        const Vec3 direction = std::sqrt(r2) * (std::cos(phi) * t + std::sin(phi) * b) +
-                               std::sqrt(1.0 - r2) * n;
+        const Vec3 direction =
+            std::sqrt(r2) * (std::cos(phi) * t + std::sin(phi) * b) + std::sqrt(1.0 - r2) * n;
         const double u = random(), v = random();
         const Vec3 origin = sample_polygon(shapes_[i].polygon.vertices, u, v);
         if (!visibility_.first_hit(origin + visibility_.offset_m() * n, direction, true)) ++escaped;
@@ -306,8 +306,7 @@ class Builder {
       for (Eigen::Index i = 0; i < n; ++i) {
         // Rows whose sampled share is tiny cannot be mended through it.
         if (!factors.usable[i] || noisy[i] < 1e-3 * factors.area_m2[i]) continue;
-        const double wanted =
-            std::clamp((factors.area_m2[i] - exact[i]) / noisy[i], 0.5, 2.0);
+        const double wanted = std::clamp((factors.area_m2[i] - exact[i]) / noisy[i], 0.5, 2.0);
         const double next = std::sqrt(x[i] * wanted);
         change = std::max(change, std::abs(next - x[i]));
         x[i] = next;
@@ -315,7 +314,8 @@ class Builder {
       if (change < 1e-12) break;
     }
     for_each_sampled([&](auto i, auto j) {
-      factors.summary.repair_max = std::max(factors.summary.repair_max, std::abs(x[i] * x[j] - 1.0));
+      factors.summary.repair_max =
+          std::max(factors.summary.repair_max, std::abs(x[i] * x[j] - 1.0));
       factors.exchange_area_m2(j, i) *= x[i] * x[j];
       factors.exchange_area_m2(i, j) = factors.exchange_area_m2(j, i);
     });

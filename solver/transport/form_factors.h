@@ -25,14 +25,14 @@ struct FormFactorOptions {
 struct FormFactorSummary {
   std::size_t pairs_unoccluded = 0, pairs_hidden = 0, pairs_sampled = 0;
   std::size_t rays = 0;
-  std::size_t buried_patches = 0;   ///< lie under another surface and see nothing
-  bool closed = false;              ///< no ray of the closure test escaped
+  std::size_t buried_patches = 0;  ///< lie under another surface and see nothing
+  bool closed = false;             ///< no ray of the closure test escaped
   std::size_t closure_rays = 0;
-  double closure_error_max = 0.0;   ///< max |sum_j F_ij - 1| before repair (closed scenes)
-  double closure_error_mean = 0.0;  ///< its area-weighted mean
-  double repair_max = 0.0;          ///< largest relative change of a sampled factor
+  double closure_error_max = 0.0;     ///< max |sum_j F_ij - 1| before repair (closed scenes)
+  double closure_error_mean = 0.0;    ///< its area-weighted mean
+  double repair_max = 0.0;            ///< largest relative change of a sampled factor
   double closure_residual_max = 0.0;  ///< max |sum_j F_ij - 1| after repair
-  double row_sum_max = 0.0;         ///< max sum_j F_ij as used
+  double row_sum_max = 0.0;           ///< max sum_j F_ij as used
 };
 
 /// All pairs of a mesh as one symmetric matrix of exchange areas S_ij = A_i F_ij (m^2), n x n, so

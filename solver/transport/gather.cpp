@@ -9,10 +9,10 @@
 namespace truebox {
 namespace {
 
-bool any_beyond(std::span<const Vec3> polygon, const Plane& plane, double sign, double tolerance_m) {
-  return std::any_of(polygon.begin(), polygon.end(), [&](const Vec3& v) {
-    return sign * plane.distance_m(v) > tolerance_m;
-  });
+bool any_beyond(std::span<const Vec3> polygon, const Plane& plane, double sign,
+                double tolerance_m) {
+  return std::any_of(polygon.begin(), polygon.end(),
+                     [&](const Vec3& v) { return sign * plane.distance_m(v) > tolerance_m; });
 }
 
 Eigen::Map<const Eigen::VectorXd> as_vector(const std::vector<double>& values) {
@@ -166,8 +166,7 @@ void Gather::add_near_field(const Vec3& point, const Vec3& normal, const Polygon
       add_near_field(point, normal, part, patch, depth + 1, source_at, scratch, sum);
     return;
   }
-  const double factor =
-      visible_factor(point, normal, polygon, mesh_.patches[patch].piece, scratch);
+  const double factor = visible_factor(point, normal, polygon, mesh_.patches[patch].piece, scratch);
   if (factor <= 0.0) return;
   Eigen::VectorXd value(sum.size());
   source_at(patch, centre, depth, value);

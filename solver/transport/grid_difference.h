@@ -10,8 +10,10 @@ namespace truebox {
 /// max(|I_h - I_2h|, |I_2h - I_4h| / 2^p), entry by entry: the second guards against grids that
 /// agree by chance, and does not bite where they converge with order p or more.
 template <class Fine, class Coarse, class Coarsest>
-auto guarded_difference(const Fine& fine, const Coarse& coarse, const Coarsest& coarsest, double p) {
-  return ((fine - coarse).cwiseAbs().cwiseMax(std::exp2(-p) * (coarse - coarsest).cwiseAbs())).eval();
+auto guarded_difference(const Fine& fine, const Coarse& coarse, const Coarsest& coarsest,
+                        double p) {
+  return ((fine - coarse).cwiseAbs().cwiseMax(std::exp2(-p) * (coarse - coarsest).cwiseAbs()))
+      .eval();
 }
 
 /// Gathered irradiance and means of surfaces: 1 + lambda, the singularity of edges in the source

@@ -24,10 +24,9 @@ Scene only_bands(const Scene& scene, const std::vector<std::size_t>& bands) {
   for (std::size_t b : bands) centres.push_back(scene.bands.centre_nm(b));
   part.bands = WavelengthGrid::from_centres(std::move(centres));
   for (std::size_t m = 0; m < scene.materials.size(); ++m)
-    for (auto [from, to] : {std::pair{&scene.materials[m].reflectance.values,
-                                      &part.materials[m].reflectance.values},
-                            std::pair{&scene.materials[m].exitance.values,
-                                      &part.materials[m].exitance.values}}) {
+    for (auto [from, to] :
+         {std::pair{&scene.materials[m].reflectance.values, &part.materials[m].reflectance.values},
+          std::pair{&scene.materials[m].exitance.values, &part.materials[m].exitance.values}}) {
       to->clear();
       for (std::size_t b : bands) to->push_back((*from)[b]);
     }
@@ -99,7 +98,8 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   const FormFactors factors = form_factors(grid.mesh, distinct_scene_, visibility, factor_options);
   grid.usable = factors.usable;
   grid.form_factors = factors.summary;
-  grid.solve = solve_radiosity(factors, rho, source, options.solve, grid.reflected, options.progress);
+  grid.solve =
+      solve_radiosity(factors, rho, source, options.solve, grid.reflected, options.progress);
   grid.indirect = band_product(factors.exchange_area_m2, grid.reflected);
   for (Index i = 0; i < grid.indirect.rows(); ++i) grid.indirect.row(i) /= factors.area_m2[i];
   level->smooth = std::make_unique<SmoothField>(grid.mesh, grid.usable, grid.indirect);
@@ -108,7 +108,8 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
 
 SolveOutcome Prediction::outcome() const {
   for (const auto& level : levels_)
-    if (level->solution.solve.outcome != SolveOutcome::converged) return level->solution.solve.outcome;
+    if (level->solution.solve.outcome != SolveOutcome::converged)
+      return level->solution.solve.outcome;
   return SolveOutcome::converged;
 }
 
@@ -140,10 +141,8 @@ BandMatrix Prediction::indirect_from_surfaces(const Level& level, const Vec3& po
     const auto& rho =
         distinct_scene_.material_of(distinct_scene_.surfaces[piece.surface]).reflectance.values;
     if (depth >= gather_again_depth && !is_secondary)
-      value = indirect_from_surfaces(level, at, piece.plane.normal, true)
-                  .colwise()
-                  .sum()
-                  .transpose();
+      value =
+          indirect_from_surfaces(level, at, piece.plane.normal, true).colwise().sum().transpose();
     else
       level.smooth->evaluate(patch, at, value);
     level.gather->add_direct(at, piece.plane.normal, value, source_scratch);

@@ -47,10 +47,10 @@ struct BoundedIrradiance {
 /// (measured: 1.7 to 2), surface by surface and without sign, so that differences cannot cancel;
 /// values at a point of a surface take p = lambda, the exponent of the edge singularity, and the
 /// largest difference in the element. Two grids that agree by chance are found out by the third:
-/// I_h - I_2h counts for no less than (I_2h - I_4h) / 2^p of the expected order. The solver's own bound is added.
-/// Neither grid's sampled visibility knows the others'. Where all three grids are too coarse to see
-/// a feature the bound cannot know of it: corner tips, and solves of a few hundred elements.
-/// Source: grid convergence index, Roache (1994), safety factor 3 for p = 2.
+/// I_h - I_2h counts for no less than (I_2h - I_4h) / 2^p of the expected order. The solver's own
+/// bound is added. Neither grid's sampled visibility knows the others'. Where all three grids are
+/// too coarse to see a feature the bound cannot know of it: corner tips, and solves of a few
+/// hundred elements. Source: grid convergence index, Roache (1994), safety factor 3 for p = 2.
 class Prediction {
  public:
   /// Solves. Check `outcome()` before using the answer. The scene must outlive the prediction.
@@ -62,8 +62,8 @@ class Prediction {
   const GridSolution& coarse() const { return levels_[1]->solution; }
   const Visibility& visibility() const { return *visibility_; }
   SolveOutcome outcome() const;
-  /// Whether the grids are fine enough for the bound to mean what it says: on average kPatchesAPiece
-  /// elements a piece or more. Below, it was seen to miss up to 10 % of test points.
+  /// Whether the grids are fine enough for the bound to mean what it says: on average
+  /// kPatchesAPiece elements a piece or more. Below, it was seen to miss up to 10 % of test points.
   bool bound_is_reliable() const;
   static constexpr double kPatchesAPiece = 40.0;
 

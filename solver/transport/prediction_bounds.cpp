@@ -60,7 +60,8 @@ void Prediction::compare_grids() {
   tbb::parallel_for(
       tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.size())),
       [&](const auto& range) {
-        Eigen::VectorXd at[3] = {Eigen::VectorXd(bands), Eigen::VectorXd(bands), Eigen::VectorXd(bands)};
+        Eigen::VectorXd at[3] = {Eigen::VectorXd(bands), Eigen::VectorXd(bands),
+                                 Eigen::VectorXd(bands)};
         for (std::uint32_t i = range.begin(); i < range.end(); ++i) {
           const Patch& patch = mesh.patches[i];
           std::uint32_t element[3] = {i, 0, 0};
@@ -72,7 +73,8 @@ void Prediction::compare_grids() {
             for (int k = 0; k < 3; ++k) levels_[k]->smooth->evaluate(element[k], point, at[k]);
             const Eigen::VectorXd guard = guarded_difference(at[0], at[1], at[2], kSmoothOrder);
             const Eigen::VectorXd own = factor.cwiseProduct((at[0] - at[1]).cwiseAbs());
-            indirect_bound_.row(i) = indirect_bound_.row(i).cwiseMax(guard.cwiseMax(own).transpose());
+            indirect_bound_.row(i) =
+                indirect_bound_.row(i).cwiseMax(guard.cwiseMax(own).transpose());
           };
           compare(patch.centroid);
           for (std::uint32_t v : mesh.corners_of(patch))
@@ -91,8 +93,10 @@ void Prediction::share_bounds_at_contacts() {
   std::vector<char> is_contact(mesh.vertices.size(), 0);
   for (std::uint32_t i = 0; i < mesh.size(); ++i)
     for (std::uint32_t v : mesh.corners_of(mesh.patches[i])) {
-      if (fine().usable[i]) patches_at[v].push_back(i);
-      else is_contact[v] = 1;
+      if (fine().usable[i])
+        patches_at[v].push_back(i);
+      else
+        is_contact[v] = 1;
     }
   const BandMatrix own = indirect_bound_;
   for (std::size_t v = 0; v < patches_at.size(); ++v) {

@@ -31,8 +31,10 @@ class Solver {
     summary_.error_bound =
         Eigen::VectorXd::Constant(rho_.cols(), std::numeric_limits<double>::infinity());
     b_ = source_;
-    if (options_.method == SolveMethod::gauss_seidel) gauss_seidel();
-    else conjugate_gradient();
+    if (options_.method == SolveMethod::gauss_seidel)
+      gauss_seidel();
+    else
+      conjugate_gradient();
     return std::move(summary_);
   }
 
@@ -41,8 +43,8 @@ class Solver {
     BandMatrix r = band_product(factors_.exchange_area_m2, b_);
     ++summary_.matrix_passes;
     for (Index i = 0; i < r.rows(); ++i)
-      r.row(i) = source_.row(i).array() + rho_.row(i).array() * r.row(i).array() / factors_.area_m2[i] -
-                 b_.row(i).array();
+      r.row(i) = source_.row(i).array() +
+                 rho_.row(i).array() * r.row(i).array() / factors_.area_m2[i] - b_.row(i).array();
     return r;
   }
 
@@ -68,7 +70,8 @@ class Solver {
     if (!std::isfinite(worst)) summary_.outcome = SolveOutcome::diverged;
     if (progress_) {
       const double wanted = std::log(options_.relative_bound);
-      progress_("radiosity", std::clamp(std::log(std::max(worst_bound, 1e-300)) / wanted, 0.0, 1.0));
+      progress_("radiosity",
+                std::clamp(std::log(std::max(worst_bound, 1e-300)) / wanted, 0.0, 1.0));
     }
     return worst_bound <= options_.relative_bound;
   }
@@ -84,10 +87,9 @@ class Solver {
             for (Index i = 0; i < b_.rows(); ++i) {
               // S is symmetric: its column is its row, and contiguous.
               gathered.noalias() = factors_.exchange_area_m2.col(i).transpose() * part;
-              part.row(i) =
-                  source_.row(i).middleCols(range.begin(), part.cols()).array() +
-                  rho_.row(i).middleCols(range.begin(), part.cols()).array() * gathered.array() /
-                      factors_.area_m2[i];
+              part.row(i) = source_.row(i).middleCols(range.begin(), part.cols()).array() +
+                            rho_.row(i).middleCols(range.begin(), part.cols()).array() *
+                                gathered.array() / factors_.area_m2[i];
             }
           },
           tbb::simple_partitioner());

@@ -14,7 +14,8 @@ enum class SolveOutcome { not_run, converged, iteration_limit, diverged };
 
 struct SolveOptions {
   SolveMethod method = SolveMethod::conjugate_gradient;
-  double relative_bound = 1e-7;  ///< stop when the bound is below this share of max |B| in each band
+  double relative_bound =
+      1e-7;  ///< stop when the bound is below this share of max |B| in each band
   int iteration_limit = 10000;
   std::string invalid() const;  ///< why these options cannot be used; empty if they can
 };

@@ -15,11 +15,11 @@ bool may_block(const Blocker& blocker, const Vec3& point, std::span<const Vec3> 
   if (std::abs(side) <= tolerance_m) return false;  // seen edge-on
   bool beyond = false;
   for (const Vec3& v : source)
-    beyond |= (side > 0.0 ? blocker.plane.distance_m(v) : -blocker.plane.distance_m(v)) < -tolerance_m;
+    beyond |=
+        (side > 0.0 ? blocker.plane.distance_m(v) : -blocker.plane.distance_m(v)) < -tolerance_m;
   if (!beyond) return false;
-  return std::any_of(blocker.polygon.begin(), blocker.polygon.end(), [&](const Vec3& v) {
-    return source_plane.distance_m(v) > tolerance_m;
-  });
+  return std::any_of(blocker.polygon.begin(), blocker.polygon.end(),
+                     [&](const Vec3& v) { return source_plane.distance_m(v) > tolerance_m; });
 }
 
 void VisibleParts::remove_shadow(const Vec3& point, const Blocker& blocker) {

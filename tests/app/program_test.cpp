@@ -33,7 +33,8 @@ Outcome run(const std::string& arguments) {
   Outcome result;
   if (!pipe) return result;
   char buffer[4096];
-  for (std::size_t n; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;) result.text.append(buffer, n);
+  for (std::size_t n; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;)
+    result.text.append(buffer, n);
   const int status = pclose(pipe);
   result.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   return result;
@@ -76,9 +77,10 @@ pixels = [16, 12]
 class Program : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) /
-              ("truebox_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) +
-               std::to_string(getpid()));
+    folder_ =
+        fs::path(testing::TempDir()) /
+        ("truebox_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) +
+         std::to_string(getpid()));
     fs::create_directories(folder_);
   }
   void TearDown() override {
@@ -107,9 +109,9 @@ TEST_F(Program, EveryCommandHasHelpWithAnExample) {
 }
 
 TEST_F(Program, WrongUsageIs64) {
-  for (const std::string arguments :
-       {"", "nonsense", "solve", "solve --no-such-option x.toml", "render x.toml",
-        "solve x.toml --elements many", "solve x.toml --method magic", "validate --only everything"})
+  for (const std::string arguments : {"", "nonsense", "solve", "solve --no-such-option x.toml",
+                                      "render x.toml", "solve x.toml --elements many",
+                                      "solve x.toml --method magic", "validate --only everything"})
     EXPECT_EQ(run(arguments).code, 64) << arguments;
 }
 
@@ -121,7 +123,8 @@ TEST_F(Program, BrokenSceneIs4AndNamesThePlace) {
        {"plan " + scene, "solve " + scene, "render " + scene + " -o " + file("x.exr")}) {
     const Outcome broken = run(arguments);
     EXPECT_EQ(broken.code, 4) << arguments;
-    EXPECT_THAT(broken.text, HasSubstr("broken.toml:15: expected one of the materials lamp, white"));
+    EXPECT_THAT(broken.text,
+                HasSubstr("broken.toml:15: expected one of the materials lamp, white"));
     EXPECT_THAT(broken.text, HasSubstr("found \"lump\""));
   }
   EXPECT_FALSE(fs::exists(file("x.exr")));
@@ -147,7 +150,8 @@ TEST_F(Program, MissingFileIs4) {
 }
 
 TEST_F(Program, UnknownCameraIs4AndListsTheKnown) {
-  const Outcome unknown = run("render " + room() + " --elements 100 --camera ear -o " + file("x.exr"));
+  const Outcome unknown =
+      run("render " + room() + " --elements 100 --camera ear -o " + file("x.exr"));
   EXPECT_EQ(unknown.code, 4);
   EXPECT_THAT(unknown.text, HasSubstr("eye"));
 }
@@ -163,7 +167,9 @@ TEST_F(Program, PlanSaysWhyAndWritesJson) {
 
 TEST_F(Program, SolveLeavesJsonAndVtu) {
   ASSERT_EQ(run("solve " + kScene + " --elements 200 -o " + file("s.json") + " --summary " +
-                file("sum.json")).code, 0);
+                file("sum.json"))
+                .code,
+            0);
   const auto json = nlohmann::json::parse(text_of(file("s.json")));
   ASSERT_EQ(json["surfaces"].size(), 17u);
   EXPECT_EQ(json["surfaces"][0]["name"], "floor");
@@ -177,8 +183,11 @@ TEST_F(Program, SolveLeavesJsonAndVtu) {
 }
 
 TEST_F(Program, ProbeLeavesATable) {
-  const std::string points = write("p.csv", "name,x,y,z,nx,ny,nz\n\"a, b\",0.5,0.5,0,0,0,1\nc,0.2,0.3,0,0,0,2\n");
-  ASSERT_EQ(run("probe " + room() + " --elements 200 --points " + points + " -o " + file("o.csv")).code, 0);
+  const std::string points =
+      write("p.csv", "name,x,y,z,nx,ny,nz\n\"a, b\",0.5,0.5,0,0,0,1\nc,0.2,0.3,0,0,0,2\n");
+  ASSERT_EQ(
+      run("probe " + room() + " --elements 200 --points " + points + " -o " + file("o.csv")).code,
+      0);
   const TableFile table = read_table(file("o.csv"));
   ASSERT_EQ(table.rows.size(), 6u);
   EXPECT_EQ(table.rows[0][0], "a, b");
@@ -192,7 +201,9 @@ TEST_F(Program, ProbeLeavesATable) {
 
 TEST_F(Program, RenderLeavesASpectralImage) {
   ASSERT_EQ(run("render " + room() + " --elements 200 --camera eye -o " + file("r.exr") +
-                " --error-bound " + file("b.exr")).code, 0);
+                " --error-bound " + file("b.exr"))
+                .code,
+            0);
   const Image image = read_image(file("r.exr")), bound = read_image(file("b.exr"));
   EXPECT_EQ(image.width, 16);
   EXPECT_EQ(image.height, 12);
@@ -201,7 +212,8 @@ TEST_F(Program, RenderLeavesASpectralImage) {
   for (const char* name : {"R", "G", "B"}) EXPECT_NE(image.find(name), nullptr) << name;
   EXPECT_EQ(image.attributes.at("unit"), "W m^-2 sr^-1 nm^-1");
   // The wall fills the middle: rho E / pi with 0 < E < 3.
-  const float middle = image.channels[spectral_channels(image).indices[1]].samples[image.index(8, 6)];
+  const float middle =
+      image.channels[spectral_channels(image).indices[1]].samples[image.index(8, 6)];
   EXPECT_GT(middle, 0.01f);
   EXPECT_LT(middle, 1.0f);
 }
@@ -209,7 +221,9 @@ TEST_F(Program, RenderLeavesASpectralImage) {
 TEST_F(Program, CompareTellsSizesTruncationAndAgreementApart) {
   for (const char* size : {"16 12", "12 16"})
     ASSERT_EQ(run("render " + room() + " --elements 100 --pixels " + size + " -o " +
-                  file("r" + std::string(size, 2) + ".exr")).code, 0);
+                  file("r" + std::string(size, 2) + ".exr"))
+                  .code,
+              0);
   EXPECT_EQ(run("compare " + file("r16.exr") + " " + file("r16.exr")).code, 0);
   EXPECT_EQ(run("compare " + file("r16.exr") + " " + file("r12.exr")).code, 3);
   const std::string whole = text_of(file("r16.exr"));
@@ -233,7 +247,9 @@ TEST_F(Program, WhatCannotBeHadIs5AndWhatCannotBeWrittenIs74) {
 TEST_F(Program, ThreadsDoNotChangeANumber) {
   for (const char* threads : {"1", "2"})
     ASSERT_EQ(run("solve " + kScene + " --elements 200 --threads " + threads + " -o " +
-                  file(std::string("t") + threads + ".json")).code, 0);
+                  file(std::string("t") + threads + ".json"))
+                  .code,
+              0);
   const auto one = nlohmann::json::parse(text_of(file("t1.json")));
   const auto two = nlohmann::json::parse(text_of(file("t2.json")));
   EXPECT_EQ(one["surfaces"], two["surfaces"]);

@@ -48,7 +48,7 @@ const std::map<std::string, Modules>& allowed_modules() {
 }
 
 struct ThirdParty {
-  std::string start;              // of the included path
+  std::string start;               // of the included path
   std::vector<std::string> homes;  // modules that may include it
   bool in_headers = false;
 };
@@ -121,8 +121,10 @@ std::vector<std::string> include_violations(const std::string& path, const std::
       bool at_home = false;
       for (const std::string& home : party.homes)
         at_home |= home.ends_with("/") ? path.starts_with(home) : module == home;
-      if (!at_home) complain(header, "outside the folder of this library");
-      else if (is_header && !party.in_headers) complain(header, "a library in a header");
+      if (!at_home)
+        complain(header, "outside the folder of this library");
+      else if (is_header && !party.in_headers)
+        complain(header, "a library in a header");
       break;
     }
     if (!is_known && header != "unistd.h")

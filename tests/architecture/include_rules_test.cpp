@@ -35,7 +35,8 @@ INSTANTIATE_TEST_SUITE_P(
         Planted{"radiometry_to_image", "solver/radiometry/a.h", "\"image/image.h\"", "order"},
         Planted{"solver_to_reference", "solver/sensor/a.cpp", "\"readings/chart.h\"", "order"},
         Planted{"reference_to_solver", "reference/readings/a.cpp", "\"scene/scene.h\"", "order"},
-        Planted{"calibration_to_reports", "calibration/fit/a.cpp", "\"document/report.h\"", "order"},
+        Planted{"calibration_to_reports", "calibration/fit/a.cpp", "\"document/report.h\"",
+                "order"},
         Planted{"solver_to_calibration", "solver/transport/a.cpp", "\"fit/chart_fit.h\"", "order"},
         Planted{"app", "reports/document/a.cpp", "\"app/commands.h\"", "no module"},
         Planted{"up_and_over", "solver/mesh/a.cpp", "\"../scene/scene.h\"", "write the module"},
@@ -81,7 +82,8 @@ std::vector<std::string> missing_header_lines(const std::string& text) {
 }
 
 TEST(ReferenceData, NameSourceUnitAndUncertainty) {
-  EXPECT_THAT(missing_header_lines("# source: x\n# unit: 1\nnm,a\n"), ElementsAre("# uncertainty: "));
+  EXPECT_THAT(missing_header_lines("# source: x\n# unit: 1\nnm,a\n"),
+              ElementsAre("# uncertainty: "));
   std::size_t tables = 0;
   for (const auto& entry : fs::recursive_directory_iterator(kCheckout / "reference")) {
     if (entry.path().extension() != ".csv") continue;
@@ -94,7 +96,8 @@ TEST(ReferenceData, NameSourceUnitAndUncertainty) {
 TEST(ReferenceData, FoldersNameTheirSources) {
   for (const auto& entry : fs::directory_iterator(kCheckout / "reference")) {
     bool has_data = false;
-    for (const auto& file : fs::directory_iterator(entry.is_directory() ? entry.path() : kCheckout / "reference"))
+    for (const auto& file :
+         fs::directory_iterator(entry.is_directory() ? entry.path() : kCheckout / "reference"))
       has_data |= entry.is_directory() && file.path().extension() == ".csv";
     if (!has_data) continue;
     EXPECT_TRUE(fs::exists(entry.path() / "SOURCES.md")) << entry.path().filename();
@@ -102,9 +105,11 @@ TEST(ReferenceData, FoldersNameTheirSources) {
 }
 
 TEST(Tree, HoldsNothingThatMayNotBePassedOn) {
-  const std::string mark = std::string("local") + "_only";  // not written out: this file is read too
+  const std::string mark =
+      std::string("local") + "_only";  // not written out: this file is read too
   std::size_t files = 0;
-  for (const char* folder : {"solver", "reference", "calibration", "reports", "app", "cmake", "tests"})
+  for (const char* folder :
+       {"solver", "reference", "calibration", "reports", "app", "cmake", "tests"})
     for (const auto& entry : fs::recursive_directory_iterator(kCheckout / folder)) {
       if (!entry.is_regular_file()) continue;
       ++files;

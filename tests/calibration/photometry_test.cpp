@@ -70,8 +70,8 @@ TEST(NoiseModel, FindsGainAndFloorOfASimulatedSensor) {
       samples.push_back(s);
   }
   const NoiseModel model = estimate_noise(samples);
-  EXPECT_NEAR(model.gain_dn, gain, 0.05 * gain);   // 5 sigma of the slope
-  EXPECT_NEAR(model.floor_dn2, floor, 0.25);       // DN^2, 5 sigma of the intercept
+  EXPECT_NEAR(model.gain_dn, gain, 0.05 * gain);  // 5 sigma of the slope
+  EXPECT_NEAR(model.floor_dn2, floor, 0.25);      // DN^2, 5 sigma of the intercept
 }
 
 TEST(NoiseModel, ShadingIsNotNoise) {

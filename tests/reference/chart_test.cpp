@@ -49,8 +49,7 @@ TEST(Chart, ErosionRemovesTheRimOfEveryPatch) {
   chart.width = 12;
   chart.height = 9;
   for (int y = 0; y < 9; ++y)
-    for (int x = 0; x < 12; ++x)
-      chart.labels.push_back(x < 6 ? std::uint8_t{1} : std::uint8_t{2});
+    for (int x = 0; x < 12; ++x) chart.labels.push_back(x < 6 ? std::uint8_t{1} : std::uint8_t{2});
   const auto eroded = eroded_labels(chart, 2);
   EXPECT_EQ(std::count(eroded.begin(), eroded.end(), 1), 2 * 5);
   EXPECT_EQ(std::count(eroded.begin(), eroded.end(), 2), 2 * 5);

@@ -73,19 +73,18 @@ TEST_P(MeasurementMistake, NamesFileLineExpectedAndFound) {
 
 INSTANTIATE_TEST_SUITE_P(
     Each, MeasurementMistake,
-    testing::Values(Mistake{"unknown_key", "veil_threshold", "veil_treshold", "one of the keys",
-                            "veil_treshold"},
-                    Mistake{"wrong_type", "bits = 8 ", "bits = \"8\" ", "a number", "8"},
-                    Mistake{"out_of_range", "saturation_dn = 246", "saturation_dn = 300",
-                            "from 1 to 255", "300"},
-                    Mistake{"bayer", "bayer = \"gbrg\"", "bayer = \"gbrx\"", "gbrg", "gbrx"},
-                    Mistake{"gain_word", "gain = \"estimate\"", "gain = \"guess\"", "estimate",
-                            "guess"},
-                    Mistake{"standard", "standards = [\"white_9.5\"", "standards = [\"pink\"",
-                            "names of chart patches", "pink"},
-                    Mistake{"no_file", "\"filter_transmission.csv\", column = \"filter_400\"",
-                            "\"nowhere.csv\", column = \"filter_400\"", "an existing file",
-                            "nowhere.csv"}),
+    testing::Values(
+        Mistake{"unknown_key", "veil_threshold", "veil_treshold", "one of the keys",
+                "veil_treshold"},
+        Mistake{"wrong_type", "bits = 8 ", "bits = \"8\" ", "a number", "8"},
+        Mistake{"out_of_range", "saturation_dn = 246", "saturation_dn = 300", "from 1 to 255",
+                "300"},
+        Mistake{"bayer", "bayer = \"gbrg\"", "bayer = \"gbrx\"", "gbrg", "gbrx"},
+        Mistake{"gain_word", "gain = \"estimate\"", "gain = \"guess\"", "estimate", "guess"},
+        Mistake{"standard", "standards = [\"white_9.5\"", "standards = [\"pink\"",
+                "names of chart patches", "pink"},
+        Mistake{"no_file", "\"filter_transmission.csv\", column = \"filter_400\"",
+                "\"nowhere.csv\", column = \"filter_400\"", "an existing file", "nowhere.csv"}),
     [](const auto& mistake) { return mistake.param.name; });
 
 TEST(MeasurementFile, NamesAMissingFile) {

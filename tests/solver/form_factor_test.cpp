@@ -14,9 +14,9 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kTolerance = 1e-13;      // what is asked of the kernel, relative
-constexpr double kKernelRounding = 2e-12; // relative: sums of some hundred logarithms of order 1
-constexpr double kClosure = 1e-13;        // of a point's factors: a few Lambert sums
+constexpr double kTolerance = 1e-13;       // what is asked of the kernel, relative
+constexpr double kKernelRounding = 2e-12;  // relative: sums of some hundred logarithms of order 1
+constexpr double kClosure = 1e-13;         // of a point's factors: a few Lambert sums
 
 Polygon square(double edge, const Vec3& corner, const Vec3& u, const Vec3& v) {
   return {corner, corner + edge * u, corner + edge * (u + v), corner + edge * v};
@@ -70,8 +70,8 @@ TEST_P(ExchangeArea, GrowsWithTheSquareOfTheScale) {
   const auto& [name, a, b] = GetParam();
   for (double scale : {1e-6, 1e6}) {
     const auto same = Eigen::Matrix3d::Identity();
-    const double there = exchange_of(moved(a, same, scale, Vec3::Zero()),
-                                  moved(b, same, scale, Vec3::Zero()));
+    const double there =
+        exchange_of(moved(a, same, scale, Vec3::Zero()), moved(b, same, scale, Vec3::Zero()));
     EXPECT_NEAR(there / (scale * scale) / exchange_of(a, b), 1.0, kKernelRounding) << scale;
   }
 }
@@ -83,7 +83,8 @@ TEST_P(ExchangeArea, IsTheSumOverHalves) {
   Polygon left, right;
   clip(a, cut, 0.0, right);
   clip(a, Plane{-cut.normal, -cut.offset_m}, 0.0, left);
-  EXPECT_NEAR((exchange_of(left, b) + exchange_of(right, b)) / exchange_of(a, b), 1.0, kKernelRounding);
+  EXPECT_NEAR((exchange_of(left, b) + exchange_of(right, b)) / exchange_of(a, b), 1.0,
+              kKernelRounding);
 }
 
 INSTANTIATE_TEST_SUITE_P(Pairs, ExchangeArea, testing::ValuesIn(pairs()),

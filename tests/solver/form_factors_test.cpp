@@ -63,7 +63,8 @@ TEST(FormFactors, ClosedSceneWithABlockIsRepairedToUnity) {
   EXPECT_TRUE(f.summary.closed);
   EXPECT_GT(f.summary.pairs_sampled, 0u);
   EXPECT_GT(f.summary.closure_error_max, 1e-6) << "sampling leaves something to repair";
-  EXPECT_LT(f.summary.closure_error_mean, 0.01) << "unrepaired: a few rays a pair, many pairs a row";
+  EXPECT_LT(f.summary.closure_error_mean, 0.01)
+      << "unrepaired: a few rays a pair, many pairs a row";
   EXPECT_LT(f.summary.closure_residual_max, 1e-4);
 }
 
@@ -80,8 +81,8 @@ TEST(FormFactors, RepairTouchesSampledEntriesOnly) {
       ++pairs;
       mesh.polygon_of(mesh.patches[static_cast<std::size_t>(i)], a);
       mesh.polygon_of(mesh.patches[static_cast<std::size_t>(j)], b);
-      const double kernel =
-          exchange_area_m2(PlanarPolygon(a), PlanarPolygon(b), FormFactorOptions{}.relative_tolerance);
+      const double kernel = exchange_area_m2(PlanarPolygon(a), PlanarPolygon(b),
+                                             FormFactorOptions{}.relative_tolerance);
       kernel_alone += f.exchange_area_m2(i, j) == kernel;
     }
   EXPECT_EQ(pairs, f.summary.pairs_unoccluded + f.summary.pairs_sampled);
@@ -97,7 +98,8 @@ TEST(FormFactors, ElementsUnderABlockAreBuried) {
   std::size_t buried = 0;
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const Vec3& c = mesh.patches[i].centroid;
-    const bool under_block = c.z() == 0.0 && c.x() > 0.31 && c.x() < 0.58 && c.y() > 0.37 && c.y() < 0.66;
+    const bool under_block =
+        c.z() == 0.0 && c.x() > 0.31 && c.x() < 0.58 && c.y() > 0.37 && c.y() < 0.66;
     buried += under_block;
     EXPECT_EQ(f.usable[i] == 0, under_block) << c.transpose();
     if (under_block) {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mesh/patch_mesh.h"
-
 #include <gmock/gmock.h>
 
 #include "mesh/contact_lines.h"
+#include "mesh/patch_mesh.h"
 #include "scene/scene_file.h"
 #include "support/tiny_scenes.h"
 
@@ -43,7 +42,8 @@ TEST_P(Mesh, ConservesTheAreaOfEveryPiece) {
 
 TEST_P(Mesh, NextLevelNestsInThisOne) {
   const Scene scene = cornell_box();
-  const PatchMesh coarse = uniform_mesh(scene, GetParam(), 0), fine = uniform_mesh(scene, GetParam(), 1);
+  const PatchMesh coarse = uniform_mesh(scene, GetParam(), 0),
+                  fine = uniform_mesh(scene, GetParam(), 1);
   EXPECT_GT(fine.size(), 3 * coarse.size());
   ASSERT_EQ(fine.pieces.size(), coarse.pieces.size());
   // Where a contact line ends inside a coarse element, its cut runs on to the element's edge; the
@@ -83,8 +83,9 @@ TEST_P(Mesh, ElementsKeepTheirSideAndShape) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Edges, Mesh, testing::Values(0.2, 0.07),
-                         [](const auto& edge) { return "mm" + std::to_string(int(1e3 * edge.param)); });
+INSTANTIATE_TEST_SUITE_P(Edges, Mesh, testing::Values(0.2, 0.07), [](const auto& edge) {
+  return "mm" + std::to_string(int(1e3 * edge.param));
+});
 
 TEST(Mesh, NoElementStraddlesTheFootprintOfABlock) {
   const Scene scene = tiny::cube_with_block(1.0, 0.5);
@@ -100,8 +101,10 @@ TEST(Mesh, NoElementStraddlesTheFootprintOfABlock) {
     const bool inside = c.x() > x0 && c.x() < x1 && c.y() > y0 && c.y() < y1;
     under += inside;
     for (const Vec3& v : polygon) {
-      const bool within = v.x() > x0 - slack && v.x() < x1 + slack && v.y() > y0 - slack && v.y() < y1 + slack;
-      const bool strictly = v.x() > x0 + slack && v.x() < x1 - slack && v.y() > y0 + slack && v.y() < y1 - slack;
+      const bool within =
+          v.x() > x0 - slack && v.x() < x1 + slack && v.y() > y0 - slack && v.y() < y1 + slack;
+      const bool strictly =
+          v.x() > x0 + slack && v.x() < x1 - slack && v.y() > y0 + slack && v.y() < y1 - slack;
       EXPECT_TRUE(inside ? within : !strictly) << v.transpose() << " of " << c.transpose();
     }
   }

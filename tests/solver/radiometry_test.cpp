@@ -59,7 +59,8 @@ TEST(TabulatedSpectrum, WeightedMeanIntegratesTheProduct) {
   const TabulatedSpectrum ramp({400, 600}, {0.0, 1.0}), weight({400, 600}, {0.0, 1.0});
   // integral x^2 / integral x on [0, 1] = (1/3) / (1/2).
   EXPECT_NEAR(ramp.weighted_mean(weight), 2.0 / 3.0, kRounding);
-  EXPECT_THROW(ramp.weighted_mean(TabulatedSpectrum({400, 600}, {0.0, 0.0})), std::invalid_argument);
+  EXPECT_THROW(ramp.weighted_mean(TabulatedSpectrum({400, 600}, {0.0, 0.0})),
+               std::invalid_argument);
 }
 
 TEST(TabulatedSpectrum, RefusesWhatIsNoSpectrum) {

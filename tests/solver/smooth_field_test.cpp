@@ -83,7 +83,8 @@ struct Shape {
 class SmoothFieldOn : public testing::TestWithParam<Shape> {};
 
 TEST_P(SmoothFieldOn, ReproducesConstants) {
-  EXPECT_LT(worst_error(mesh_of(GetParam().polygon, 0.2), [](double, double) { return 3.0; }, 31),
+  EXPECT_LT(worst_error(
+                mesh_of(GetParam().polygon, 0.2), [](double, double) { return 3.0; }, 31),
             3.0 * kRounding);
 }
 
@@ -95,7 +96,9 @@ TEST_P(SmoothFieldOn, ReproducesLinearFunctions) {
 // Third order, borders included: there a third ring of elements completes the quadratic.
 TEST_P(SmoothFieldOn, IsBetterThanSecondOrder) {
   constexpr double lowest = 2.5;  // third order, less what two grids of finite size leave to chance
-  const Function f = [](double x, double y) { return 3.0 + std::sin(2.0 * x + 0.5) * std::cos(1.5 * y); };
+  const Function f = [](double x, double y) {
+    return 3.0 + std::sin(2.0 * x + 0.5) * std::cos(1.5 * y);
+  };
   const double coarse = worst_error(mesh_of(GetParam().polygon, 0.1), f, 33);
   const double fine = worst_error(mesh_of(GetParam().polygon, 0.025), f, 33);
   const double order = std::log(coarse / fine) / std::log(4.0);

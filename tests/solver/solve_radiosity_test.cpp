@@ -55,7 +55,8 @@ FormFactors coupled_rooms(const FormFactors& one) {
 
 FormFactors factors_of(Room room) {
   const double edge = room == Room::micrometre ? 1e-6 : room == Room::megametre ? 1e6 : 1.0;
-  const Scene scene = room == Room::block ? tiny::cube_with_block(edge, 0.5) : tiny::cube(edge, 0.5);
+  const Scene scene =
+      room == Room::block ? tiny::cube_with_block(edge, 0.5) : tiny::cube(edge, 0.5);
   const PatchMesh mesh = uniform_mesh(scene, 0.25 * edge);
   FormFactorOptions options;
   options.relative_tolerance = 1e-13;
@@ -108,7 +109,8 @@ TEST_P(SolveRadiosity, ReproducesFurnaceClosedForm) {
   BandMatrix b;
   const SolveSummary summary = solve_radiosity(f_, constant(0.5), constant(1.0), options(), b);
   ASSERT_EQ(summary.outcome, SolveOutcome::converged) << summary.brief();
-  const double closure = std::max(std::abs(f_.summary.row_sum_max - 1.0), f_.summary.closure_residual_max);
+  const double closure =
+      std::max(std::abs(f_.summary.row_sum_max - 1.0), f_.summary.closure_residual_max);
   for (Index i = 0; i < n_; ++i)
     EXPECT_NEAR(b(i, 0), f_.usable[static_cast<std::size_t>(i)] ? 2.0 : 1.0,
                 summary.error_bound[0] + 2.0 * (closure + 1e-14));
@@ -200,7 +202,8 @@ TEST_P(SolveRadiosity, SaysWhenItRunsOutOfIterations) {
 TEST_P(SolveRadiosity, SaysWhenTheInputIsNoNumber) {
   BandMatrix source = constant(1.0), b;
   source(3, 0) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(solve_radiosity(f_, constant(0.5), source, options(), b).outcome, SolveOutcome::diverged);
+  EXPECT_EQ(solve_radiosity(f_, constant(0.5), source, options(), b).outcome,
+            SolveOutcome::diverged);
 }
 
 TEST_P(SolveRadiosity, RefusesImpossibleOptions) {

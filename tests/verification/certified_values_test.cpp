@@ -29,19 +29,19 @@ TEST_P(CertifiedValues, AreReproducedInDigits) {
     fewest = std::min(fewest, matching_digits(c.computed, c.certified));
   }
   EXPECT_GE(fewest, GetParam().digits);
-  std::printf("%s: %zu checks, fewest digits %.1f\n", GetParam().name.c_str(), checks.size(), fewest);
+  std::printf("%s: %zu checks, fewest digits %.1f\n", GetParam().name.c_str(), checks.size(),
+              fewest);
 }
 
 // Fewest digits: the furnace at rho = 1 - 1e-6 amplifies rounding by 1e6 twice over; plates with
 // gap 1e-8 lose 2e-8 of their view, amplified by 1 / (1 - rho); probes carry Monte Carlo noise.
-INSTANTIATE_TEST_SUITE_P(
-    Groups, CertifiedValues,
-    testing::Values(Group{"viewfactors", check_view_factors, 20, 9.0},
-                    Group{"furnace", check_furnace, 10, 9.0},
-                    Group{"plates", check_infinite_plates, 6, 5.0},
-                    Group{"cube", check_ceiling_lit_cube, 12, 10.0},
-                    Group{"cie171", check_cie171, 40, 9.0}),
-    [](const auto& group) { return group.param.name; });
+INSTANTIATE_TEST_SUITE_P(Groups, CertifiedValues,
+                         testing::Values(Group{"viewfactors", check_view_factors, 20, 9.0},
+                                         Group{"furnace", check_furnace, 10, 9.0},
+                                         Group{"plates", check_infinite_plates, 6, 5.0},
+                                         Group{"cube", check_ceiling_lit_cube, 12, 10.0},
+                                         Group{"cie171", check_cie171, 40, 9.0}),
+                         [](const auto& group) { return group.param.name; });
 
 TEST(AccuracyCheck, FailsOnANumberThatIsNone) {
   AccuracyCheck check{"g", "n", std::nan(""), 1.0, 1.0, "1", ""};

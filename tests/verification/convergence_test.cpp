@@ -64,22 +64,28 @@ TEST(Convergence, CeilingLitCubeIsOfTheOrderItsEdgesAllow) {
     ASSERT_EQ(solve_radiosity(factors, rho, source, options, b).outcome, SolveOutcome::converged);
     for (int r = 0; r < 2; ++r)
       for (int f = 0; f < 3; ++f)
-        error[r][f][g] = std::abs(face_mean(mesh, b, r, surface[f]) - certified(table, rhos[r], faces[f]));
+        error[r][f][g] =
+            std::abs(face_mean(mesh, b, r, surface[f]) - certified(table, rhos[r], faces[f]));
   }
-  std::printf("error of the mean, W m^-2 nm^-1 per unit emission, N x N elements a face\n"
-              "%-5s%-16s%11s%11s%11s%11s   order 4-8  8-16 16-32\n", "rho", "", "N=4", "8", "16", "32");
+  std::printf(
+      "error of the mean, W m^-2 nm^-1 per unit emission, N x N elements a face\n"
+      "%-5s%-16s%11s%11s%11s%11s   order 4-8  8-16 16-32\n",
+      "rho", "", "N=4", "8", "16", "32");
   // A 90-degree edge has B = B0 + c x^lambda with lambda = 0.763 (rho .5), 0.627 (rho .8): means
   // converge at 1 + lambda, smooth parts at 2. N=4 to 8 is not yet asymptotic for every face.
   constexpr double kLowest = 1.5, kHighest = 2.1;
   for (int r = 0; r < 2; ++r)
     for (int f = 0; f < 3; ++f) {
       const double* e = error[r][f];
-      std::printf("%-5s%-16s%11.3g%11.3g%11.3g%11.3g", rhos[r].c_str(), faces[f], e[0], e[1], e[2], e[3]);
+      std::printf("%-5s%-16s%11.3g%11.3g%11.3g%11.3g", rhos[r].c_str(), faces[f], e[0], e[1], e[2],
+                  e[3]);
       for (int g = 1; g < 4; ++g) std::printf("%8.2f", std::log2(e[g - 1] / e[g]));
       std::printf("\n");
       for (int g = 1; g < 4; ++g) {
-        EXPECT_GE(std::log2(e[g - 1] / e[g]), kLowest) << rhos[r] << ", " << faces[f] << ", " << grids[g];
-        EXPECT_LE(std::log2(e[g - 1] / e[g]), kHighest) << rhos[r] << ", " << faces[f] << ", " << grids[g];
+        EXPECT_GE(std::log2(e[g - 1] / e[g]), kLowest)
+            << rhos[r] << ", " << faces[f] << ", " << grids[g];
+        EXPECT_LE(std::log2(e[g - 1] / e[g]), kHighest)
+            << rhos[r] << ", " << faces[f] << ", " << grids[g];
       }
     }
 }

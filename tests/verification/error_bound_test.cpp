@@ -26,7 +26,8 @@ TEST(PredictionBound, CoversTheDifferenceOfTwoPredictions) {
   std::mt19937_64 random(71);
   std::vector<double> areas;
   for (std::size_t i = 0; i < mesh.size(); ++i) {
-    const bool lit = b.fine().usable[i] && !scene.surfaces[mesh.surface_of(mesh.patches[i])].is_opening;
+    const bool lit =
+        b.fine().usable[i] && !scene.surfaces[mesh.surface_of(mesh.patches[i])].is_opening;
     areas.push_back(lit ? mesh.patches[i].area_m2 : 0.0);
   }
   std::discrete_distribution<std::size_t> pick(areas.begin(), areas.end());

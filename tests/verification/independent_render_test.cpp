@@ -14,9 +14,9 @@ namespace {
 // Share of pixel-bands outside own bound + 3 standard errors. A normal distribution leaves 0.27 %;
 // the reference's standard errors come from 1024 paths each, with heavy tails in dark pixels.
 constexpr double kShareOutside = 0.006;
-constexpr double kMeanZ = 0.3;      // standard errors: a bias of all pixels together
-constexpr double kRmsZ = 1.25;      // 1 for pure reference noise, own error adds in quadrature
-constexpr double kMeanBound = 0.01; // of the mean radiance: a bound that says something
+constexpr double kMeanZ = 0.3;       // standard errors: a bias of all pixels together
+constexpr double kRmsZ = 1.25;       // 1 for pure reference noise, own error adds in quadrature
+constexpr double kMeanBound = 0.01;  // of the mean radiance: a bound that says something
 
 class IndependentRender : public testing::Test {
  protected:
@@ -27,14 +27,16 @@ class IndependentRender : public testing::Test {
     camera.pixels = {256, 256};
     const RenderedImage image = render(prediction, Camera(camera), {});
     const RenderAgreement a = render_agreement(image.radiance, image.error_bound, truth_, error_);
-    std::printf("%zu pixel-bands, outside %.3f %%, mean z %.3f, rms z %.3f, mean bound %.2f %%, bias %.3f %%\n",
-                a.samples, 100.0 * a.share_outside(), a.mean_z, a.rms_z, 100.0 * a.mean_bound,
-                100.0 * a.bias);
+    std::printf(
+        "%zu pixel-bands, outside %.3f %%, mean z %.3f, rms z %.3f, mean bound %.2f %%, bias %.3f "
+        "%%\n",
+        a.samples, 100.0 * a.share_outside(), a.mean_z, a.rms_z, 100.0 * a.mean_bound,
+        100.0 * a.bias);
     return a;
   }
   static bool agrees(const RenderAgreement& a) {
-    return a.samples > 300000 && a.share_outside() <= kShareOutside && std::abs(a.mean_z) <= kMeanZ &&
-           a.rms_z < kRmsZ && a.mean_bound < kMeanBound;
+    return a.samples > 300000 && a.share_outside() <= kShareOutside &&
+           std::abs(a.mean_z) <= kMeanZ && a.rms_z < kRmsZ && a.mean_bound < kMeanBound;
   }
 
   const std::string folder_ = std::string(TRUEBOX_REFERENCE_DIR) + "/independent_renders/";
