@@ -28,6 +28,7 @@ struct Surface {
   std::size_t material = 0;
   std::vector<Polygon> pieces;
   bool is_opening = false;  ///< nothing is there: light leaves, cameras and rays pass
+  bool two_sided = false;   ///< the second half of `pieces` are the backs of the first
 };
 
 /// A pinhole camera as a scene file gives it; lengths in m.

@@ -261,7 +261,8 @@ class Reader {
       surface.pieces = pieces(table);
       if (const toml::node* two_sided = table.get("two_sided")) {
         if (!two_sided->is_boolean()) fail(*two_sided, "true or false", described(*two_sided));
-        if (*two_sided->value<bool>()) add_back_sides(surface.pieces);
+        surface.two_sided = *two_sided->value<bool>();
+        if (surface.two_sided) add_back_sides(surface.pieces);
       }
       scene_.surfaces.push_back(std::move(surface));
     }

@@ -22,6 +22,23 @@ struct Visibility::Implementation {
   double scale = 1.0;
   double offset_m = 0.0;
   std::vector<std::uint32_t> piece_of[2];  // triangle -> piece: surfaces, openings
+  std::vector<std::uint32_t> back_of;      // piece -> the piece on its back, or itself
+
+  // The two sides of a surface are one sheet: rays meet the front, `back_of` names the other.
+  void pair_sides(const Scene& truebox_scene) {
+    back_of.resize(mesh->pieces.size());
+    for (std::uint32_t p = 0; p < back_of.size(); ++p) back_of[p] = p;
+    for (std::uint32_t first = 0; first < back_of.size();) {
+      const std::size_t s = mesh->pieces[first].surface;
+      const auto count = static_cast<std::uint32_t>(truebox_scene.surfaces[s].pieces.size());
+      if (truebox_scene.surfaces[s].two_sided)
+        for (std::uint32_t k = 0; k < count / 2; ++k) {
+          back_of[first + k] = first + k + count / 2;
+          back_of[first + k + count / 2] = first + k;
+        }
+      first += count;
+    }
+  }
 
   ~Implementation() {
     if (scene) rtcReleaseScene(scene);
@@ -37,6 +54,7 @@ struct Visibility::Implementation {
     for (std::uint32_t p = 0; p < mesh->pieces.size(); ++p) {
       const Piece& piece = mesh->pieces[p];
       if (truebox_scene.surfaces[piece.surface].is_opening != openings) continue;
+      if (back_of[p] < p) continue;  // the front stands for both
       const auto first = static_cast<unsigned>(vertices.size() / 3);
       for (const Vec3& v : piece.polygon)
         for (int k = 0; k < 3; ++k) vertices.push_back(static_cast<float>(unit(v)[k]));
@@ -77,6 +95,7 @@ Visibility::Visibility(const PatchMesh& mesh, const Scene& scene)
   if (!self.device) throw std::runtime_error("Embree cannot start");
   self.scene = rtcNewScene(self.device);
   rtcSetSceneFlags(self.scene, RTC_SCENE_FLAG_ROBUST);
+  self.pair_sides(scene);
   self.add(scene, false);
   self.add(scene, true);
   rtcCommitScene(self.scene);
@@ -129,6 +148,8 @@ std::optional<Visibility::Hit> Visibility::first_hit(const Vec3& origin, const V
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   Hit hit;
   hit.piece = self.piece_of[query.hit.geomID][query.hit.primID];
+  if (self.mesh->pieces[hit.piece].plane.normal.dot(direction) > 0.0)
+    hit.piece = self.back_of[hit.piece];
   const Plane& plane = self.mesh->pieces[hit.piece].plane;
   const double cosine = plane.normal.dot(direction);
   hit.front = cosine < 0.0;

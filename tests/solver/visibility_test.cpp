@@ -56,6 +56,25 @@ double adaptive_mean(const std::function<double(double, double)>& f, double x0, 
   return 0.25 * sum;
 }
 
+TEST(Visibility, ATwoSidedSheetShowsAFrontToEitherSide) {
+  Scene scene = tiny::grey_scene(0.5);
+  const Polygon sheet{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  scene.surfaces.push_back(
+      {"sheet", 0, {sheet, Polygon(sheet.rbegin(), sheet.rend())}, false, true});
+  tiny::add_surface(scene, "one-sided", {{2, 0, 0}, {3, 0, 0}, {3, 1, 0}, {2, 1, 0}});
+  const PatchMesh mesh = uniform_mesh(scene, 0.5);
+  const Visibility visibility(mesh, scene);
+  for (const double side : {1.0, -1.0}) {
+    const auto hit = visibility.first_hit({0.3, 0.4, side}, {0, 0, -side});
+    ASSERT_TRUE(hit);
+    EXPECT_TRUE(hit->front);
+    EXPECT_GT(mesh.pieces[hit->piece].plane.normal.z() * side, 0.0);
+  }
+  const auto back = visibility.first_hit({2.3, 0.4, -1.0}, {0, 0, 1});
+  ASSERT_TRUE(back);
+  EXPECT_FALSE(back->front);  // no other side was asked for
+}
+
 TEST(VisibleFactor, ReproducesOccludedViewFactors) {
   const TableFile table =
       read_table(std::string(TRUEBOX_REFERENCE_DIR) + "/analytic/view_factors.csv");
