@@ -9,5 +9,5 @@ function(truebox_test name)
     TRUEBOX_REFERENCE_DIR="${PROJECT_SOURCE_DIR}/reference" TRUEBOX_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     TRUEBOX_PROGRAM="$<TARGET_FILE:truebox_program>")
   add_dependencies(${name} truebox_program)
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+  gtest_discover_tests(${name} NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
 endfunction()
