@@ -183,7 +183,7 @@ Eigen::MatrixXd covariance(const Eigen::MatrixXd& j, const Free& free, FitSummar
   const Eigen::VectorXd norms = j.colwise().norm().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled_j = j * norms.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled_j.transpose() * scaled_j);
-  const Eigen::VectorXd values = eigen.eigenvalues();
+  const Eigen::VectorXd& values = eigen.eigenvalues();
   const double smallest = values[0], largest = values[values.size() - 1];
   summary.condition = smallest > 0.0 ? largest / smallest : std::numeric_limits<double>::infinity();
   if (!(smallest > kRankTolerance * largest)) {

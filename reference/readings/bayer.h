@@ -16,7 +16,7 @@ class BayerPattern {
 
   /// 'R', 'G' or 'B' of the photosite at pixel (x, y).
   char site(int x, int y) const {
-    return pattern_[static_cast<std::size_t>((y & 1) * 2 + (x & 1))];
+    return pattern_[2 * static_cast<std::size_t>(y & 1) + static_cast<std::size_t>(x & 1)];
   }
 
   const std::string& name() const { return name_; }

@@ -73,7 +73,7 @@ std::optional<std::string> svg_objection(std::string_view svg) {
     if (closing && (open.empty() || open.back() != name)) return "tags that do not match";
     const std::size_t end = svg.find('>');
     const bool empty_element = end != svg.npos && end > 0 && svg[end - 1] == '/';
-    if (const auto objection = attributes_objection(svg)) return objection;
+    if (auto objection = attributes_objection(svg)) return objection;
     if (closing) open.pop_back();
     if (!closing && !empty_element) open.push_back(name);
     if (open.empty()) return svg.empty() ? std::nullopt : std::optional("text after </svg>");

@@ -88,7 +88,7 @@ std::string ribbon(const PlotSeries& s, const AxisScale& x, const AxisScale& y) 
   for (std::size_t i = 0; i < s.x.size(); ++i) {
     if (!x.shows(s.x[i]) || !y.shows(s.y[i] + s.u_y[i]) || !y.shows(s.y[i] - s.u_y[i])) continue;
     upper += fmt::format("{:.2f},{:.2f} ", x(s.x[i]), y(s.y[i] + s.u_y[i]));
-    lower = fmt::format("{:.2f},{:.2f} ", x(s.x[i]), y(s.y[i] - s.u_y[i])) + lower;
+    lower.insert(0, fmt::format("{:.2f},{:.2f} ", x(s.x[i]), y(s.y[i] - s.u_y[i])));
   }
   return "<polygon fill-opacity=\"0.2\" stroke=\"none\" points=\"" + upper + lower + "\"/>";
 }

@@ -43,6 +43,7 @@ Image codecs::read_png(const std::filesystem::path& path) try {
   const std::size_t stride = png_get_rowbytes(reader.png, reader.info);
   std::vector<png_byte> bytes(stride * static_cast<std::size_t>(image.height));
   std::vector<png_bytep> rows;
+  rows.reserve(static_cast<std::size_t>(image.height));
   for (int y = 0; y < image.height; ++y)
     rows.push_back(bytes.data() + stride * static_cast<std::size_t>(y));
   png_read_image(reader.png, rows.data());
@@ -54,7 +55,8 @@ Image codecs::read_png(const std::filesystem::path& path) try {
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)
       for (int c = 0; c < planes; ++c) {
-        const int i = x * planes + c;
+        const auto i = static_cast<std::size_t>(x) * static_cast<std::size_t>(planes) +
+                       static_cast<std::size_t>(c);
         const int dn = depth == 16 ? rows[y][2 * i] * 256 + rows[y][2 * i + 1] : rows[y][i];
         image.channels[c].samples[image.index(x, y)] = static_cast<float>(dn);
       }

@@ -110,7 +110,7 @@ Monomials mean_monomials(const PatchMesh& mesh, const Patch& patch, const ToPlan
 }  // namespace
 
 void SmoothField::fit_corner(const PatchMesh& mesh, const std::vector<std::uint32_t>& neighbours,
-                             const BandMatrix& means, Corner& corner) const {
+                             const BandMatrix& means, Corner& corner) {
   const auto k = static_cast<Eigen::Index>(neighbours.size());
   Eigen::MatrixXd basis(k, 6);
   Eigen::VectorXd weight(k);

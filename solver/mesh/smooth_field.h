@@ -37,8 +37,8 @@ class SmoothField {
     double size_m;
     BandMatrix coefficients;  // 1, u, v, uu, uv, vv  x bands
   };
-  void fit_corner(const PatchMesh& mesh, const std::vector<std::uint32_t>& neighbours,
-                  const BandMatrix& means, Corner& corner) const;
+  static void fit_corner(const PatchMesh& mesh, const std::vector<std::uint32_t>& neighbours,
+                         const BandMatrix& means, Corner& corner);
 
   const PatchMesh* mesh_;
   std::vector<std::uint32_t> corner_of_;  // for each entry of mesh.corners, into corners_

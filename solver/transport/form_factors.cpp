@@ -57,8 +57,11 @@ class Builder {
  public:
   Builder(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
           const FormFactorOptions& options)
-      : mesh_(mesh), scene_(scene), visibility_(visibility), options_(options) {
-    tolerance_m_ = 1e-9 * scene.diameter_m();
+      : mesh_(mesh),
+        scene_(scene),
+        visibility_(visibility),
+        options_(options),
+        tolerance_m_(1e-9 * scene.diameter_m()) {
     make_shapes();
   }
 

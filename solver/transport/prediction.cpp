@@ -21,6 +21,7 @@ constexpr int kGatherAgainDepth = 3;  // receivers within about half an element 
 Scene only_bands(const Scene& scene, const std::vector<std::size_t>& bands) {
   Scene part = scene;
   std::vector<double> centres;
+  centres.reserve(bands.size());
   for (std::size_t b : bands) centres.push_back(scene.bands.centre_nm(b));
   part.bands = WavelengthGrid::from_centres(std::move(centres));
   for (std::size_t m = 0; m < scene.materials.size(); ++m)
