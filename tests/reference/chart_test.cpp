@@ -12,6 +12,7 @@
 #include "radiometry/input_error.h"
 #include "readings/bayer.h"
 #include "readings/photograph.h"
+#include "support/scratch.h"
 
 namespace truebox {
 namespace {
@@ -21,7 +22,7 @@ using testing::HasSubstr;
 const std::string kFolder = std::string(TRUEBOX_REFERENCE_DIR) + "/llanos_narrowband/";
 const std::string kLabels = kFolder + "labels/d2_colorChecker30cm_550nm_labels.png";
 
-std::string temporary(const std::string& name) { return testing::TempDir() + "chart_" + name; }
+std::string temporary(const std::string& name) { return scratch_path("chart_" + name); }
 
 void write(const std::string& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary) << bytes;

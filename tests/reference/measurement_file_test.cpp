@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "radiometry/input_error.h"
+#include "support/scratch.h"
 
 namespace truebox {
 namespace {
@@ -34,7 +35,7 @@ std::string changed(std::string text, const std::string& from, const std::string
                                   "\"chart_reflectance", "\"filter_transmission"})
     for (std::size_t at = text.find(start); at != std::string::npos; at = text.find(start, at + 1))
       text.insert(at + 1, kFolder);
-  const std::string path = testing::TempDir() + "measurement_" + name + ".toml";
+  const std::string path = scratch_path("measurement_" + name + ".toml");
   std::ofstream(path) << text;
   return path;
 }
@@ -89,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(MeasurementFile, NamesAMissingFile) {
   try {
-    read_measurement(testing::TempDir() + "no_such_measurement.toml");
+    read_measurement(scratch_path("no_such_measurement.toml"));
     FAIL();
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("no such file"));

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "radiometry/input_error.h"
+#include "support/scratch.h"
 
 namespace truebox {
 namespace {
@@ -14,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 
 std::string write_table(const std::string& name, const std::string& text) {
-  const std::string path = testing::TempDir() + "provenance_" + name + ".csv";
+  const std::string path = scratch_path("provenance_" + name + ".csv");
   std::ofstream(path) << text;
   return path;
 }

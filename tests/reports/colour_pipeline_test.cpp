@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "radiometry/input_error.h"
+#include "support/scratch.h"
 
 namespace truebox {
 namespace {
@@ -26,7 +27,7 @@ class Ocio : public testing::Test {
     if (!path_.empty()) std::filesystem::remove(path_);
   }
   void use_config(const std::string& text) {
-    path_ = testing::TempDir() + "/truebox_test_config.ocio";
+    path_ = scratch_path("config.ocio");
     std::ofstream(path_) << text;
     ::setenv("OCIO", path_.c_str(), 1);
   }

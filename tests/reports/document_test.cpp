@@ -9,6 +9,7 @@
 #include "document/writers.h"
 #include "figures/score_plot.h"
 #include "radiometry/input_error.h"
+#include "support/scratch.h"
 
 namespace truebox {
 namespace {
@@ -206,7 +207,7 @@ TEST(WorstOutcome, NothingCheckedIsNothingShown) {
 }
 
 TEST(WriteReport, LeavesTheFourFilesAndNothingElse) {
-  const auto directory = std::filesystem::path(testing::TempDir()) / "truebox_write_report_test";
+  const auto directory = std::filesystem::path(scratch_path("write_report"));
   std::filesystem::remove_all(directory);
   write_report(directory, sample());
   std::vector<std::string> names;

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "radiometry/input_error.h"
+#include "support/scratch.h"
 
 namespace truebox {
 namespace {
@@ -53,7 +54,7 @@ pixels = [10, 8]
 )";
 
 std::string write(const std::string& name, const std::string& text) {
-  const std::string path = testing::TempDir() + name;
+  const std::string path = scratch_path(name);
   std::ofstream(path) << text;
   return path;
 }
@@ -250,7 +251,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(SceneFile, NamesAMissingFile) {
   try {
-    read_scene(testing::TempDir() + "no_such_scene.toml");
+    read_scene(scratch_path("no_such_scene.toml"));
     FAIL();
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("no_such_scene.toml"));
