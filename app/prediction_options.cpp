@@ -67,9 +67,9 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
 std::string describe(const Predicted& p) {
   const GridSolution& grid = p.prediction->fine();
   const FormFactorSummary& f = grid.form_factors;
-  std::string text =
-      fmt::format("{} elements ({} on the coarse grid), {} bands, {:.2f} s\n", grid.mesh.size(),
-                  p.prediction->coarse().mesh.size(), p.scene.bands.size(), p.seconds);
+  std::string text = fmt::format("{} elements ({} on the next coarser grid), {} bands, {:.2f} s\n",
+                                 grid.mesh.size(), p.prediction->coarse().mesh.size(),
+                                 p.scene.bands.size(), p.seconds);
   for (const auto& reason : p.prediction->needs().reasons) text += "  " + reason + "\n";
   if (!p.prediction->needs().interreflection) return text;
   text += fmt::format(

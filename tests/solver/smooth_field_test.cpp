@@ -95,7 +95,8 @@ TEST_P(SmoothFieldOn, ReproducesLinearFunctions) {
 
 // Third order, borders included: there a third ring of elements completes the quadratic.
 TEST_P(SmoothFieldOn, IsBetterThanSecondOrder) {
-  constexpr double lowest = 2.5;  // third order, less what two grids of finite size leave to chance
+  constexpr double kLowestOrder =
+      2.5;  // third order, less what two grids of finite size leave to chance
   const Function f = [](double x, double y) {
     return 3.0 + std::sin(2.0 * x + 0.5) * std::cos(1.5 * y);
   };
@@ -103,7 +104,7 @@ TEST_P(SmoothFieldOn, IsBetterThanSecondOrder) {
   const double fine = worst_error(mesh_of(GetParam().polygon, 0.025), f, 33);
   const double order = std::log(coarse / fine) / std::log(4.0);
   RecordProperty("order", std::to_string(order));
-  EXPECT_GT(order, lowest) << coarse << " at 0.1, " << fine << " at 0.025";
+  EXPECT_GT(order, kLowestOrder) << coarse << " at 0.1, " << fine << " at 0.025";
 }
 
 INSTANTIATE_TEST_SUITE_P(Shapes, SmoothFieldOn,

@@ -12,7 +12,7 @@ namespace {
 
 TEST(PredictionBound, CoversTheDifferenceOfTwoPredictions) {
   // 1200 and 6000 elements, seeds of visibility apart: what they say of the same 200 points may
-  // differ by the sum of their bounds. The bound is an estimate from two grids, not a theorem:
+  // differ by the sum of their bounds. The bound is an estimate from three grids, not a theorem:
   // 99 % of the point-bands must lie within, and none by more than twice.
   constexpr double kCoverage = 0.99, kWorst = 2.0;
   const Scene scene = cornell_box_in_seven_bands();
