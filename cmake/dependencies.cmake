@@ -1,6 +1,7 @@
 # The libraries, for the build and for users of the installed package alike. packages.txt names the
 # Debian packages that bring them.
 find_package(Threads REQUIRED)
+find_package(ZLIB REQUIRED)
 find_package(PNG REQUIRED)
 find_package(TIFF REQUIRED)
 find_package(OpenEXR CONFIG REQUIRED)

@@ -18,4 +18,19 @@ std::optional<std::vector<std::uint8_t>> base64_decode(std::string_view text);
 /// nothing. A report may come from a stranger; what it carries must not run or fetch anything.
 std::optional<std::string> svg_objection(std::string_view svg);
 
+/// A plane as bit patterns of halves, to be multiplied by 2^exponent.
+struct PackedPlane {
+  std::vector<std::uint16_t> bits;
+  int exponent = 0;
+};
+PackedPlane half_plane(const std::vector<float>& plane, bool is_uncertainty);
+
+/// The `packed` of an ImageSet: planes p >= period, p < predicted as differences to p - period.
+std::vector<std::uint8_t> deflate_planes(const std::vector<PackedPlane>& planes, std::size_t period,
+                                         std::size_t predicted);
+
+/// The bytes of a zlib stream if there are exactly `size` of them.
+std::optional<std::vector<std::uint8_t>> inflate_exactly(const std::vector<std::uint8_t>& packed,
+                                                         std::size_t size);
+
 }  // namespace truebox::detail

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "document/codecs.h"
+#include "document/image_set_json.h"
 #include "document/writers.h"
 #include "radiometry/input_error.h"
 
@@ -79,9 +80,11 @@ Table table(const Json& json) {
 }
 
 PictureRow picture_row(const Json& json) {
-  PictureRow row{{}, text(json, "caption")};
+  PictureRow row{{}, text(json, "caption"), std::nullopt};
   for (const auto& p : json.at("panels"))
     row.panels.push_back({text(p, "title"), picture(p.at("picture")), text(p, "alt")});
+  if (json.contains("image_set"))
+    row.image_set = detail::image_set_from_text(json["image_set"].dump());
   return row;
 }
 

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "document/codecs.h"
+#include "document/image_set_json.h"
 #include "document/writers.h"
 #include "figures/text.h"
 
@@ -78,7 +79,9 @@ Json write_block(const PictureRow& row) {
   for (const auto& p : row.panels)
     panels.push_back(
         {{"title", text(p.title)}, {"alt", text(p.alt)}, {"picture", write(p.picture)}});
-  return {{"kind", "pictures"}, {"caption", text(row.caption)}, {"panels", panels}};
+  Json json = {{"kind", "pictures"}, {"caption", text(row.caption)}, {"panels", panels}};
+  if (row.image_set) json["image_set"] = Json::parse(detail::image_set_text(*row.image_set));
+  return json;
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "difference/agreement.h"
+#include "document/image_set.h"
 #include "figures/false_colour.h"
 
 namespace truebox {
@@ -89,10 +90,12 @@ struct Panel {
   std::string alt{};
 };
 
-/// Pictures of the same pixels; a reader can flip between them in place.
+/// Pictures of the same pixels; a reader can flip between them in place. With the numbers behind
+/// them the page shows those instead where it can run its script: every band, any exposure.
 struct PictureRow {
   std::vector<Panel> panels;
   std::string caption{};
+  std::optional<ImageSet> image_set{};
 };
 
 using Block = std::variant<Paragraph, Table, Figure, PictureRow>;

@@ -68,6 +68,7 @@ const std::vector<ThirdParty>& third_parties() {
       {"mustache", {"reports/document"}},
       {"kainjow/", {"reports/document"}},
       {"nlohmann/", {"reports/document"}},
+      {"zlib.h", {"reports/document"}},
       {"fmt/", {"reports/"}},
       {"tbb/", {"solver/"}},
       {"Eigen/", {"solver/", "calibration/"}, true},
