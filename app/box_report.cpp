@@ -13,6 +13,7 @@
 #include "figures/score_plot.h"
 #include "image/image_file.h"
 #include "image/spectral_image.h"
+#include "sensor/visible_surfaces.h"
 
 namespace truebox::app {
 namespace {
@@ -45,9 +46,28 @@ Image with_colour(Image image, const Observer& observer) {
   return image;
 }
 
-PictureRow comparison_row(const RenderedImage& image, const IndependentRender& other,
-                          const Observer& observer, const ColourPipeline& colour,
-                          std::vector<float>& z) {
+/// The numbers behind the pictures: the prediction with its bound, the path tracer with its
+/// standard error, and which surface each pixel shows.
+ImageSet numbers_behind(const Predicted& predicted, const RenderedImage& image,
+                        const IndependentRender& other, const Observer& observer, double exposure) {
+  CameraDescription camera = predicted.scene.cameras.at("front");
+  camera.pixels = {image.radiance.width, image.radiance.height};
+  const std::vector<int> surfaces = visible_surfaces(*predicted.prediction, Camera(camera));
+  const Image prediction = matching_bands(image.radiance, other.radiance);
+  const Image bound = matching_bands(image.error_bound, other.radiance);
+  ImageSetOptions options;
+  options.exposure = exposure;
+  options.observer = &observer;
+  options.surface_of_pixel = surfaces;
+  for (const Surface& s : predicted.scene.surfaces) options.surfaces.push_back(s.name);
+  return make_image_set({"Prediction (simulated)", &prediction, &bound, UncertaintyKind::bound},
+                        {"Path tracer (simulated)", &other.radiance, &other.standard_error},
+                        options);
+}
+
+PictureRow comparison_row(const Predicted& predicted, const RenderedImage& image,
+                          const IndependentRender& other, const Observer& observer,
+                          const ColourPipeline& colour, std::vector<float>& z) {
   const Image reference = with_colour(other.radiance, observer);
   const Image prediction = with_colour(matching_bands(image.radiance, other.radiance), observer);
   const double exposure = exposure_for_quantile(reference.find("R")->samples, 0.95);  // warm lamp
@@ -78,6 +98,7 @@ PictureRow comparison_row(const RenderedImage& image, const IndependentRender& o
       "the blocks indirect light falls off faster than the elements resolve, and the bound below "
       "is "
       "largest there.";
+  row.image_set = numbers_behind(predicted, image, other, observer, exposure);
   return row;
 }
 
@@ -222,7 +243,7 @@ ReportPart box_report(const Predicted& predicted, const RenderedImage& image,
 
   std::vector<float> z;
   Section box{"The Cornell Box as measured, predicted", {}};
-  box.blocks.push_back(comparison_row(image, other, observer, colour, z));
+  box.blocks.push_back(comparison_row(predicted, image, other, observer, colour, z));
   box.blocks.push_back(bound_row(image));
   const std::vector<double> scores(z.begin(), z.end());
   box.blocks.push_back(Figure{

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "difference/ciede2000.h"
+#include "image/spectral_image.h"
 #include "radiometry/table_file.h"
 
 namespace truebox::app {
@@ -49,6 +50,39 @@ Image ChartColour::composite(std::vector<float> ChartPlanes::*plane) const {
   return image;
 }
 
+/// All bands of photograph and prediction with their uncertainties, black outside the patches:
+/// nothing is predicted there.
+ImageSet ChartColour::numbers_behind(double exposure) const {
+  const ChartPlanes& first = measurement_.bands.front().planes;
+  Image sides[4];  // photograph, its u, prediction, its u
+  for (Image& side : sides) side = Image(first.width, first.height);
+  for (const BandMeasurement& band : measurement_.bands) {
+    const ChartPlanes& p = band.planes;
+    Channel* planes[4];
+    const std::string name = spectral_channel_name(band.band.centre_nm.value);
+    for (int k = 0; k < 4; ++k) planes[k] = &sides[k].add_channel(name);
+    for (std::size_t i = 0; i < p.photograph.size(); ++i) {
+      if (p.patch[i] == 0) continue;
+      planes[0]->samples[i] = p.photograph[i];
+      planes[1]->samples[i] = std::sqrt(p.photograph_variance[i]);
+      planes[2]->samples[i] = p.prediction[i];
+      planes[3]->samples[i] = std::sqrt(p.prediction_variance[i]);
+    }
+  }
+  ImageSetOptions options;
+  options.quantity = "reflectance x relative illumination";
+  options.exposure = exposure;
+  options.surfaces = measurement_.chart.patches;
+  std::vector<int> patch_of_pixel;
+  for (const int n : first.patch) patch_of_pixel.push_back(n - 1);
+  options.surface_of_pixel = patch_of_pixel;
+  ImageSet set = make_image_set({"Photograph", &sides[0], &sides[1]},
+                                {"Prediction", &sides[2], &sides[3]}, options);
+  for (std::size_t b = 0; b < set.bands.size(); ++b)
+    set.bands[b].linear_rgb = linear_bt709(weights_[b]);
+  return set;
+}
+
 PictureRow ChartColour::pictures(const ColourPipeline& pipeline) const {
   const Image photograph = composite(&ChartPlanes::photograph);
   const Image prediction = composite(&ChartPlanes::prediction);
@@ -73,6 +107,7 @@ PictureRow ChartColour::pictures(const ColourPipeline& pipeline) const {
       "colours are those of seven samples of a spectrum, not of the whole spectrum. Bottom row: "
       "the "
       "six grey standards, inputs of the fit.";
+  row.image_set = numbers_behind(exposure);
   return row;
 }
 

@@ -26,6 +26,7 @@ class ChartColour {
  private:
   Tristimulus colour_of(const std::vector<double>& reflectance) const;
   Image composite(std::vector<float> ChartPlanes::*plane) const;
+  ImageSet numbers_behind(double exposure) const;
 
   const ChartMeasurement& measurement_;
   std::vector<Tristimulus> weights_;  // one a band

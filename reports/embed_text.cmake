@@ -1,11 +1,16 @@
-# embed_text(<out.cpp> <variable> <file>): a text file as `truebox::embedded::<variable>`, so that
-# the program finds it in the build tree, in the install tree and anywhere else alike.
-function(embed_text output variable file)
-  set_property(DIRECTORY APPEND PROPERTY
-    CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${file})
-  file(READ ${CMAKE_CURRENT_SOURCE_DIR}/${file} text)
+# embed_text(<out.cpp> <variable> <files>...): text files, one after the other, as
+# `truebox::embedded::<variable>`, so that the program finds them in the build tree, in the install
+# tree and anywhere else alike.
+function(embed_text output variable)
+  set(text "")
+  foreach(file IN LISTS ARGN)
+    set_property(DIRECTORY APPEND PROPERTY
+      CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${file})
+    file(READ ${CMAKE_CURRENT_SOURCE_DIR}/${file} part)
+    string(APPEND text "${part}")
+  endforeach()
   file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${output} @ONLY CONTENT
-"// Generated from @file@: edit that file.
+"// Generated from @ARGN@: edit there.
 namespace truebox::embedded {
 extern const char* const @variable@;
 const char* const @variable@ = R\"~~~~(@text@)~~~~\";

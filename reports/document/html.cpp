@@ -6,7 +6,9 @@
 #include <stdexcept>
 
 #include "document/codecs.h"
+#include "document/image_set_json.h"
 #include "document/writers.h"
+#include "figures/colour_map.h"
 #include "figures/text.h"
 
 namespace truebox {
@@ -14,6 +16,8 @@ namespace embedded {
 extern const char* const kReportTemplate;
 extern const char* const kReportStyle;
 extern const char* const kReportScript;
+extern const char* const kViewerStyle;
+extern const char* const kViewerScript;
 }  // namespace embedded
 
 namespace {
@@ -109,10 +113,44 @@ data block_data(const Figure& figure) {
   return d;
 }
 
+/// JSON inside a script element: there only "</script" and "<!--" mean anything to HTML.
+std::string script_json(const std::string& json) {
+  std::string text;
+  text.reserve(json.size());
+  for (char c : json) {
+    if (c == '<')
+      text += "\\u003c";
+    else
+      text += c;
+  }
+  return text;
+}
+
+/// 256 steps of both false-colour maps, for the viewer.
+std::string colour_maps_json() {
+  std::string sequential, diverging;
+  for (int i = 0; i < 256; ++i) {
+    const Rgb8 s = sequential_colour(i / 255.0), d = diverging_colour(i / 127.5 - 1.0);
+    sequential += fmt::format("{:02x}{:02x}{:02x}", s[0], s[1], s[2]);
+    diverging += fmt::format("{:02x}{:02x}{:02x}", d[0], d[1], d[2]);
+  }
+  return fmt::format(R"({{"sequential":"{}","diverging":"{}"}})", sequential, diverging);
+}
+
+bool has_image_set(const Report& report) {
+  for (const auto& section : report.sections)
+    for (const auto& block : section.blocks)
+      if (const auto* row = std::get_if<PictureRow>(&block); row != nullptr && row->image_set)
+        return true;
+  return false;
+}
+
 data block_data(const PictureRow& row) {
   data d = texts({{"caption", row.caption}});
   d.set("is_pictures", true);
   d.set("several", row.panels.size() > 1);
+  d.set("has_image_set", row.image_set.has_value());
+  if (row.image_set) d.set("image_set", script_json(detail::image_set_text(*row.image_set)));
   List panels = list();
   for (const auto& p : row.panels)
     panels << texts({{"panel_title", p.title},
@@ -159,11 +197,17 @@ data section_data(const Section& section, std::size_t index) {
 }  // namespace
 
 std::string to_html(const Report& report) {
+  const bool viewer = has_image_set(report);
+  const auto with_viewer = [&](const char* text, const char* more) {
+    return viewer ? std::string(text) + more : std::string(text);
+  };
   data d = texts({{"title", report.title},
                   {"subtitle", report.subtitle},
                   {"sentence", report.verdict.sentence},
-                  {"style", embedded::kReportStyle},
-                  {"script", embedded::kReportScript}});
+                  {"style", with_viewer(embedded::kReportStyle, embedded::kViewerStyle)},
+                  {"script", with_viewer(embedded::kReportScript, embedded::kViewerScript)},
+                  {"colour_maps", viewer ? colour_maps_json() : ""}});
+  d.set("has_viewer", viewer);
   set_outcome(d, report.verdict.outcome);
   List key_numbers = list(), sections = list(), checks = list(), provenance = list();
   for (const auto& n : report.key_numbers)

@@ -149,6 +149,10 @@ void Chromium::open(const std::filesystem::path& page) {
   state_->receive_until(-1, [this] { return state_->loaded; });
 }
 
+void Chromium::before_every_page(const std::string& script) {
+  state_->call("Page.addScriptToEvaluateOnNewDocument", {{"source", script}});
+}
+
 std::string Chromium::evaluate(const std::string& expression) {
   const Json answer = state_->call("Runtime.evaluate", {{"expression", expression},
                                                         {"awaitPromise", true},

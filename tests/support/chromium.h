@@ -26,6 +26,9 @@ class Chromium {
   /// Loads a file and waits for its load event.
   void open(const std::filesystem::path& page);
 
+  /// A script that runs in every page opened from now on, before the page's own.
+  void before_every_page(const std::string& script);
+
   /// The value of a JavaScript expression as JSON, a promise's when it is kept: "3", "\"text\"",
   /// "null". Throws std::runtime_error with the message of what the expression throws.
   std::string evaluate(const std::string& expression);
