@@ -14,6 +14,8 @@
 #include "image/spectral_image.h"
 #include "prediction_options.h"
 #include "radiometry/input_error.h"
+#include "scene/scene_file.h"
+#include "sensor_options.h"
 
 namespace truebox::app {
 namespace {
@@ -22,6 +24,7 @@ struct RenderArguments {
   PredictionArguments prediction;
   std::string camera, output, error_bound;
   std::vector<int> pixels;
+  SensorArguments sensor;
 };
 
 const CameraDescription& find_camera(const Scene& scene, const std::string& name) {
@@ -48,8 +51,13 @@ int render_scene(const RenderArguments& a) {
   const auto observer = read_observer(
       std::filesystem::path(reference_directory()) / "colour" / "cie1931_2deg_xyz.csv",
       "CIE 1931 2 deg");
-  if (std::filesystem::path(a.output).extension() != ".exr")
-    throw InputError(a.output, 0, "an output ending in .exr", a.output);
+  const bool counts = wants_counts(a.sensor, a.output);
+  if (!counts && std::filesystem::path(a.output).extension() != ".exr")
+    throw InputError(a.output, 0, "an output ending in .exr, .tif or .png", a.output);
+  if (counts) {  // before the solve, which may take long
+    const Scene scene = read_scene(a.prediction.scene);
+    check_sensor(a.sensor, a.output, scene, find_camera(scene, a.camera));
+  }
   const auto predicted = predict(a.prediction);
   if (predicted->prediction->outcome() != SolveOutcome::converged) {
     fmt::print(stderr, "truebox: the solver did not reach its bound\n");
@@ -69,28 +77,39 @@ int render_scene(const RenderArguments& a) {
       "truebox prediction (simulated) of " + predicted->scene.path;
   image.radiance.attributes["errorBound"] = fmt::format("{:.3g} of the mean radiance", share);
   image.error_bound.attributes["source"] = "error bound of " + a.output;
-  write_exr(a.output, image.radiance);
+  std::string photograph;
+  if (counts)
+    photograph = write_simulated_photograph(a.sensor, a.output, predicted->scene, description,
+                                            image.radiance);
+  else
+    write_exr(a.output, image.radiance);
   if (!a.error_bound.empty()) write_exr(a.error_bound, image.error_bound);
   fmt::print(
-      "{}  render: {} x {} pixels, {:.2f} s, mean error bound {:.2f} % of the mean radiance\n",
-      describe(*predicted), description.pixels[0], description.pixels[1], seconds, 100.0 * share);
+      "{}  render: {} x {} pixels, {:.2f} s, mean error bound {:.2f} % of the mean radiance\n"
+      "{}",
+      describe(*predicted), description.pixels[0], description.pixels[1], seconds, 100.0 * share,
+      photograph);
   return kAgrees;
 }
 
 }  // namespace
 
 void add_render_command(CLI::App& program, Action& chosen) {
-  auto* command = program.add_subcommand("render", "the spectral radiance a camera would see");
+  auto* command = program.add_subcommand(
+      "render", "the spectral radiance a camera would see, or a simulated photograph");
   auto arguments = std::make_shared<RenderArguments>();
   add_prediction_options(*command, arguments->prediction);
   command->add_option("--camera", arguments->camera, "name of the camera in the scene");
-  command->add_option("-o,--output", arguments->output, "spectral OpenEXR, with R, G, B")
+  command
+      ->add_option("-o,--output", arguments->output,
+                   "spectral OpenEXR, with R, G, B; .tif or .png: sensor counts")
       ->required();
   command->add_option("--error-bound", arguments->error_bound,
                       "OpenEXR of the bound of each pixel and band");
   command->add_option("--pixels", arguments->pixels, "width and height instead of the scene's")
       ->expected(2)
       ->check(CLI::Range(1, 32768));
+  add_sensor_options(*command, arguments->sensor);
   command->footer(
       "Example: truebox render reference/cornell_box/cornell_box.toml --camera front -o box.exr");
   command->callback([=, &chosen] { chosen = [=] { return render_scene(*arguments); }; });

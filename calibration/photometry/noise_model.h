@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "readings/bayer.h"
+#include "image/bayer.h"
 #include "readings/photograph.h"
 
 namespace truebox {

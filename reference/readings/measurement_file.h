@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "image/bayer.h"
 #include "provenance/provenance.h"
-#include "readings/bayer.h"
 
 namespace truebox {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "image/bayer.h"
 #include "image/image.h"
 #include "provenance/provenance.h"
-#include "readings/bayer.h"
 
 namespace truebox {
 

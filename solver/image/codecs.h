@@ -2,7 +2,10 @@
 // The readers behind read_image, one library a file. Internal to this folder.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "image/image.h"
 
@@ -11,6 +14,13 @@ namespace truebox::codecs {
 Image read_exr(const std::filesystem::path& path);
 Image read_png(const std::filesystem::path& path);
 Image read_tiff(const std::filesystem::path& path);
+
+/// 16-bit samples, `planes` interleaved.
+std::vector<std::uint8_t> encode_png16(int width, int height, int planes,
+                                       const std::vector<std::uint16_t>& samples,
+                                       const std::string& description);
+void write_tiff16(const std::filesystem::path& path, int width, int height, int planes,
+                  const std::vector<std::uint16_t>& samples, const std::string& description);
 
 /// A header may lie: larger images are refused before memory is asked for.
 inline constexpr std::size_t kMaxPixels = std::size_t{1} << 28;

@@ -19,6 +19,12 @@ Image read_image(const std::filesystem::path& path);
 /// only when complete. Throws std::runtime_error when the disk refuses.
 void write_exr(const std::filesystem::path& path, const Image& image);
 
+/// Writes whole digital numbers (0 to 65535) of one channel or of three as 16-bit grey or RGB, PNG
+/// or TIFF by the file's ending, `description` inside it. Complete or not at all, as above.
+/// InputError: another ending, another number of channels, a sample that is no such number.
+void write_counts(const std::filesystem::path& path, const Image& image,
+                  const std::string& description);
+
 /// Encodes an 8-bit RGB image (3 x width x height interleaved bytes) as PNG.
 std::vector<std::uint8_t> encode_png_rgb8(int width, int height,
                                           const std::vector<std::uint8_t>& rgb);

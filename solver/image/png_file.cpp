@@ -68,8 +68,11 @@ Image codecs::read_png(const std::filesystem::path& path) try {
   throw InputError(path.string(), 0, "a complete PNG image", error.what());
 }
 
-std::vector<std::uint8_t> encode_png_rgb8(int width, int height,
-                                          const std::vector<std::uint8_t>& rgb) {
+namespace {
+
+// Encodes rows of interleaved samples, 16-bit ones with their high byte first.
+std::vector<std::uint8_t> encode(int width, int height, int depth, int colour_type,
+                                 const std::uint8_t* rows, const std::string& description) {
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, &fail, &ignore);
   png_infop info = png_create_info_struct(png);
   std::vector<std::uint8_t> bytes;
@@ -81,13 +84,20 @@ std::vector<std::uint8_t> encode_png_rgb8(int width, int height,
       },
       [](png_structp) {});
   try {
-    png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 8,
-                 PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+    png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height),
+                 depth, colour_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                  PNG_FILTER_TYPE_DEFAULT);
+    std::string key = "Description", text = description;
+    png_text comment{};
+    comment.compression = PNG_TEXT_COMPRESSION_NONE;
+    comment.key = key.data();
+    comment.text = text.data();
+    comment.text_length = text.size();
+    if (!text.empty()) png_set_text(png, info, &comment, 1);
     png_write_info(png, info);
+    const std::size_t stride = png_get_rowbytes(png, info);
     for (int y = 0; y < height; ++y)
-      png_write_row(png, rgb.data() + std::size_t{3} * static_cast<std::size_t>(width) *
-                                          static_cast<std::size_t>(y));
+      png_write_row(png, rows + stride * static_cast<std::size_t>(y));
     png_write_end(png, info);
   } catch (...) {
     png_destroy_write_struct(&png, &info);
@@ -95,6 +105,26 @@ std::vector<std::uint8_t> encode_png_rgb8(int width, int height,
   }
   png_destroy_write_struct(&png, &info);
   return bytes;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encode_png_rgb8(int width, int height,
+                                          const std::vector<std::uint8_t>& rgb) {
+  return encode(width, height, 8, PNG_COLOR_TYPE_RGB, rgb.data(), "");
+}
+
+std::vector<std::uint8_t> codecs::encode_png16(int width, int height, int planes,
+                                               const std::vector<std::uint16_t>& samples,
+                                               const std::string& description) {
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(2 * samples.size());
+  for (const std::uint16_t sample : samples) {
+    bytes.push_back(static_cast<std::uint8_t>(sample >> 8));
+    bytes.push_back(static_cast<std::uint8_t>(sample & 255));
+  }
+  return encode(width, height, 16, planes == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB,
+                bytes.data(), description);
 }
 
 }  // namespace truebox

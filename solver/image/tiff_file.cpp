@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <tiffio.h>
 
+#include <algorithm>
 #include <cstdarg>
 #include <cstdio>
 #include <memory>
@@ -21,6 +22,15 @@ void keep_error(const char* module, const char* format, va_list arguments) {
   last_error = std::string(module ? module : "") + ": " + text;
 }
 
+void keep_errors() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    TIFFSetErrorHandler(&keep_error);
+    TIFFSetWarningHandler(nullptr);
+  });
+  last_error.clear();
+}
+
 float sample(const unsigned char* row, std::size_t i, int bits, bool is_float) {
   switch (bits) {
     case 8: return row[i];
@@ -34,12 +44,7 @@ float sample(const unsigned char* row, std::size_t i, int bits, bool is_float) {
 }  // namespace
 
 Image codecs::read_tiff(const std::filesystem::path& path) try {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    TIFFSetErrorHandler(&keep_error);
-    TIFFSetWarningHandler(nullptr);
-  });
-  last_error.clear();
+  keep_errors();
   std::unique_ptr<TIFF, decltype(&TIFFClose)> tiff(TIFFOpen(path.c_str(), "r"), &TIFFClose);
   if (!tiff) throw std::runtime_error(last_error);
   std::uint32_t width = 0, height = 0;
@@ -78,6 +83,33 @@ Image codecs::read_tiff(const std::filesystem::path& path) try {
   throw;
 } catch (const std::exception& error) {
   throw InputError(path.string(), 0, "a complete TIFF image", error.what());
+}
+
+void codecs::write_tiff16(const std::filesystem::path& path, int width, int height, int planes,
+                          const std::vector<std::uint16_t>& samples,
+                          const std::string& description) {
+  keep_errors();
+  std::unique_ptr<TIFF, decltype(&TIFFClose)> tiff(TIFFOpen(path.c_str(), "w"), &TIFFClose);
+  if (!tiff) throw std::runtime_error(last_error);
+  TIFFSetField(tiff.get(), TIFFTAG_IMAGEWIDTH, width);
+  TIFFSetField(tiff.get(), TIFFTAG_IMAGELENGTH, height);
+  TIFFSetField(tiff.get(), TIFFTAG_BITSPERSAMPLE, 16);
+  TIFFSetField(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, planes);
+  TIFFSetField(tiff.get(), TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
+  TIFFSetField(tiff.get(), TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+  TIFFSetField(tiff.get(), TIFFTAG_PHOTOMETRIC,
+               planes == 1 ? PHOTOMETRIC_MINISBLACK : PHOTOMETRIC_RGB);
+  TIFFSetField(tiff.get(), TIFFTAG_ROWSPERSTRIP, TIFFDefaultStripSize(tiff.get(), 0));
+  TIFFSetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, description.c_str());
+  const std::size_t stride = static_cast<std::size_t>(width) * static_cast<std::size_t>(planes);
+  std::vector<std::uint16_t> row(stride);
+  for (int y = 0; y < height; ++y) {
+    const auto from = samples.begin() + static_cast<std::ptrdiff_t>(stride) * y;
+    std::copy(from, from + static_cast<std::ptrdiff_t>(stride), row.begin());
+    if (TIFFWriteScanline(tiff.get(), row.data(), static_cast<std::uint32_t>(y)) < 0)
+      throw std::runtime_error(last_error);
+  }
+  if (TIFFFlush(tiff.get()) == 0) throw std::runtime_error(last_error);
 }
 
 }  // namespace truebox

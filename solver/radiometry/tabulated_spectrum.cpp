@@ -69,15 +69,25 @@ bool TabulatedSpectrum::covers(double from_nm, double to_nm) const {
   return !empty() && wavelengths_nm_.front() <= from_nm && wavelengths_nm_.back() >= to_nm;
 }
 
+namespace {
+
+// Spacing of the table where it is finest under a band: a line between coarse samples counts.
+double finest_spacing_nm(const std::vector<double>& x, double from, double to) {
+  double finest = 1e9;
+  for (std::size_t i = 1; i < x.size(); ++i)
+    if (x[i] > from && x[i - 1] < to) finest = std::min(finest, x[i] - x[i - 1]);
+  return finest;
+}
+
+}  // namespace
+
 std::vector<double> sample_bands(const TabulatedSpectrum& spectrum, const WavelengthGrid& grid) {
-  const auto& x = spectrum.wavelengths_nm();
-  const double spacing =
-      x.size() > 1 ? (x.back() - x.front()) / static_cast<double>(x.size() - 1) : 1e9;
   std::vector<double> bands(grid.size());
   for (std::size_t b = 0; b < grid.size(); ++b) {
-    const bool coarse = grid.width_nm(b) <= 1.5 * spacing;
-    bands[b] = coarse ? spectrum.at(grid.centre_nm(b))
-                      : spectrum.band_mean(grid.centre_nm(b), grid.width_nm(b));
+    const double centre = grid.centre_nm(b), width = grid.width_nm(b);
+    const double spacing =
+        finest_spacing_nm(spectrum.wavelengths_nm(), centre - 0.5 * width, centre + 0.5 * width);
+    bands[b] = width <= 1.5 * spacing ? spectrum.at(centre) : spectrum.band_mean(centre, width);
   }
   return bands;
 }

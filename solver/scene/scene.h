@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "radiometry/spectral.h"
 #include "radiometry/wavelength_grid.h"
+#include "scene/camera_description.h"
 #include "scene/polygon.h"
 
 namespace truebox {
@@ -17,6 +17,7 @@ struct Material {
   std::string name;
   Reflectance reflectance;   ///< 0 <= rho < 1
   RadiantExitance exitance;  ///< own emission, W m^-2 nm^-1 (or relative, where its source says so)
+  TabulatedSpectrum exitance_spectrum = {};  ///< as its source tabulates it: finer than the bands
 
   bool emits() const;
 };
@@ -29,16 +30,6 @@ struct Surface {
   std::vector<Polygon> pieces;
   bool is_opening = false;  ///< nothing is there: light leaves, cameras and rays pass
   bool two_sided = false;   ///< the second half of `pieces` are the backs of the first
-};
-
-/// A pinhole camera as a scene file gives it; lengths in m.
-struct CameraDescription {
-  Vec3 position_m = Vec3::Zero();
-  Vec3 direction = Vec3::UnitZ();
-  Vec3 up = Vec3::UnitY();
-  double focal_length_m = 0.035;
-  std::array<double, 2> film_m = {0.025, 0.025};
-  std::array<int, 2> pixels = {512, 512};
 };
 
 /// Lambertian surfaces, their materials in each band, and the cameras that look at them. SI units.

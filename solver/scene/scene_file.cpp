@@ -138,9 +138,10 @@ class Reader {
     }
   }
 
-  std::vector<double> spectrum(const toml::node& node, const char* what) {
-    if (!node.is_table()) return std::vector<double>(scene_.bands.size(), number(node, what));
-    if (grey_) fail(node, "[bands], because a material has a spectrum", "no [bands]");
+  // As the file or the source tabulates it; a number holds at all wavelengths.
+  TabulatedSpectrum tabulated(const toml::node& node, const char* what) const {
+    if (!node.is_table()) return TabulatedSpectrum({550.0}, {number(node, what)});
+    if (grey_) fail(node, "[bands], because a material or camera has a spectrum", "no [bands]");
     const toml::table& table = *node.as_table();
     try {
       if (table.contains("file")) {
@@ -148,18 +149,21 @@ class Reader {
         const auto file = path_.parent_path() / text(need(table, "file", what), "a file name");
         const auto column = text(need(table, "column", "column = \"name\""), "a column name");
         const toml::node* scale = table.get("scale");  // for data that are only relative
-        auto values = sample_bands(spectrum_from_table(read_table(file), column), scene_.bands);
+        const auto table_curve = spectrum_from_table(read_table(file), column);
+        std::vector<double> values = table_curve.values();
         for (double& v : values) v *= scale ? number(*scale) : 1.0;
-        return values;
+        return TabulatedSpectrum(table_curve.wavelengths_nm(), std::move(values));
       }
       allow_keys(table, {"nm", "value"});
-      return sample_bands(
-          TabulatedSpectrum(numbers(need(table, "nm", what), "a list of wavelengths in nm"),
-                            numbers(need(table, "value", what), "a list of values")),
-          scene_.bands);
+      return TabulatedSpectrum(numbers(need(table, "nm", what), "a list of wavelengths in nm"),
+                               numbers(need(table, "value", what), "a list of values"));
     } catch (const std::invalid_argument& error) {
       fail(node, "a sorted spectrum with as many values as wavelengths", error.what());
     }
+  }
+
+  std::vector<double> spectrum(const toml::node& node, const char* what) const {
+    return sample_bands(tabulated(node, what), scene_.bands);
   }
 
   void read_materials(const toml::table& root) {
@@ -178,6 +182,7 @@ class Reader {
                std::to_string(r));
       material.exitance = RadiantExitance(scene_.bands.size(), 0.0);
       if (const toml::node* exitance = table.get("exitance")) {
+        material.exitance_spectrum = tabulated(*exitance, "an exitance");
         material.exitance = RadiantExitance(spectrum(*exitance, "an exitance"));
         for (double e : material.exitance.values)
           if (e < 0.0) fail(*exitance, "exitance >= 0", std::to_string(e));
@@ -284,8 +289,14 @@ class Reader {
     if (!node) return;
     for (const auto& [key, item] : table_of(*node, "tables [cameras.NAME]")) {
       const toml::table& table = table_of(item, "a table [cameras.NAME]");
-      allow_keys(table, {"position", "direction", "up", "focal_length_mm", "film_mm", "pixels"});
-      scene_.cameras[std::string(key.str())] = camera(table);
+      allow_keys(table, {"position", "direction", "up", "focal_length_mm", "film_mm", "pixels",
+                         "lens", "sensor"});
+      CameraDescription& described_camera = scene_.cameras[std::string(key.str())];
+      described_camera = camera(table);
+      if (const toml::node* part = table.get("lens"))
+        read_lens(table_of(*part, "a table [cameras.NAME.lens]"), described_camera);
+      if (const toml::node* part = table.get("sensor"))
+        read_sensor(table_of(*part, "a table [cameras.NAME.sensor]"), described_camera);
     }
   }
 
@@ -314,6 +325,151 @@ class Reader {
     if (pixels.size() != 2) fail(grid, "pixels = [width, height]", described(grid));
     camera.pixels = {static_cast<int>(pixels[0]), static_cast<int>(pixels[1])};
     return camera;
+  }
+
+  double number_in(const toml::table& table, const char* key, double fallback, double low,
+                   double high, const char* what) const {
+    const toml::node* node = table.get(key);
+    if (!node) return fallback;
+    const double value = number(*node, what);
+    if (value < low || value > high) fail(*node, what, described(*node));
+    return value;
+  }
+
+  bool flag(const toml::table& table, const char* key, bool fallback) const {
+    const toml::node* node = table.get(key);
+    if (!node) return fallback;
+    if (!node->is_boolean()) fail(*node, "true or false", described(*node));
+    return *node->value<bool>();
+  }
+
+  // A share of light, [0, 1], known in every band: what no table covers is not invented.
+  TabulatedSpectrum efficiency(const toml::node& node, const char* what) const {
+    const TabulatedSpectrum curve = tabulated(node, what);
+    for (double v : curve.values())
+      if (v < 0.0 || v > 1.0) fail(node, "values in [0, 1]", std::to_string(v));
+    const auto& nm = scene_.bands.centres_nm();
+    if (node.is_table() && !curve.covers(nm.front(), nm.back()))
+      fail(node, "a table that covers all bands",
+           "one from " + std::to_string(curve.wavelengths_nm().front()) + " to " +
+               std::to_string(curve.wavelengths_nm().back()) + " nm");
+    return curve;
+  }
+
+  LensDistortion distortion(const toml::node& node) const {
+    const toml::table& table = table_of(node, "distortion = { k1 = number, ... }");
+    LensDistortion d;
+    const std::map<std::string, double*> members = {
+        {"k1", &d.k1}, {"k2", &d.k2}, {"k3", &d.k3}, {"k4", &d.k4}, {"k5", &d.k5}, {"k6", &d.k6},
+        {"p1", &d.p1}, {"p2", &d.p2}, {"s1", &d.s1}, {"s2", &d.s2}, {"s3", &d.s3}, {"s4", &d.s4}};
+    std::set<std::string> keys;
+    for (const auto& [key, member] : members) keys.insert(key);
+    allow_keys(table, keys);
+    for (const auto& [key, value] : table) *members.at(std::string(key.str())) = number(value);
+    return d;
+  }
+
+  // Transmittance at an image height r, both dimensionless, must stay that of a lens.
+  void check_vignetting(const toml::node& node, const CameraDescription& camera) const {
+    double corner = 0.0;
+    for (std::size_t k = 0; k < 2; ++k)
+      corner =
+          std::hypot(corner, 0.5 * camera.film_m[k] + std::abs(camera.lens.principal_point_m[k]));
+    for (int step = 0; step <= 1000; ++step) {
+      const double r = step / 1000.0 * corner / camera.focal_length_m;
+      const double transmittance = camera.lens.vignetting_at(r);
+      if (transmittance < 0.0)
+        fail(node, "a polynomial that is not negative on the film",
+             std::to_string(transmittance) + " at r = " + std::to_string(r));
+    }
+  }
+
+  void read_lens(const toml::table& table, CameraDescription& camera) const {
+    allow_keys(table, {"distortion", "principal_point_px", "f_number", "vignetting",
+                       "point_spread_um", "veiling_glare", "transmittance", "filter"});
+    LensDescription& lens = camera.lens;
+    if (const toml::node* node = table.get("distortion")) lens.distortion = distortion(*node);
+    if (const toml::node* node = table.get("principal_point_px")) {
+      const auto centre = numbers(*node, "principal_point_px = [x, y]");
+      if (centre.size() != 2) fail(*node, "principal_point_px = [x, y]", described(*node));
+      for (std::size_t k = 0; k < 2; ++k)
+        lens.principal_point_m[k] =
+            (centre[k] - 0.5 * camera.pixels[k]) * camera.pixel_pitch_m()[k];
+    }
+    if (table.contains("f_number"))
+      lens.f_number = number_in(table, "f_number", 0.0, 0.5, 1e4, "an f-number from 0.5 to 10000");
+    if (const toml::node* node = table.get("vignetting")) {
+      const char* what = "vignetting = { cos4 = true, polynomial = [a1, ...] }";
+      const toml::table& vignetting = table_of(*node, what);
+      allow_keys(vignetting, {"cos4", "polynomial"});
+      lens.cos4 = flag(vignetting, "cos4", false);
+      if (const toml::node* list = vignetting.get("polynomial")) {
+        lens.vignetting_polynomial = numbers(*list, what);
+        check_vignetting(*list, camera);
+      }
+    }
+    lens.point_spread_m =
+        1e-6 * number_in(table, "point_spread_um", 0.0, 0.0, 1e4, "0 to 10000 um");
+    lens.veiling_glare =
+        number_in(table, "veiling_glare", 0.0, 0.0, 0.99, "a share of the light, 0 to 0.99");
+    for (const char* key : {"filter", "transmittance"})
+      if (const toml::node* node = table.get(key))
+        lens.transmittances.push_back(efficiency(*node, "a transmittance"));
+  }
+
+  std::vector<SensorChannel> sensor_channels(const toml::node& node) const {
+    const char* what = "an efficiency, or a table of them: R = ..., G = ..., B = ...";
+    const toml::table* table = node.as_table();
+    if (!table || table->contains("nm") || table->contains("file"))
+      return {{"Y", efficiency(node, what)}};
+    std::vector<SensorChannel> channels;
+    for (const char* name : {"R", "G", "B"})  // the order that viewers expect, others after them
+      if (const toml::node* curve = table->get(name))
+        channels.push_back({name, efficiency(*curve, what)});
+    for (const auto& [key, curve] : *table)
+      if (key != "R" && key != "G" && key != "B")
+        channels.push_back({std::string(key.str()), efficiency(curve, what)});
+    if (channels.empty()) fail(node, what, "an empty table");
+    return channels;
+  }
+
+  void read_sensor(const toml::table& table, CameraDescription& camera) const {
+    allow_keys(table, {"quantum_efficiency", "bayer", "exposure_s", "gain_dn", "offset_dn",
+                       "read_noise_dn", "dark_current_electrons_per_s", "full_well_electrons",
+                       "bits", "shot_noise"});
+    if (!camera.lens.f_number)
+      fail(table, "f_number in the camera's lens, because a sensor sees through an aperture",
+           "none");
+    const double most = 1e300;
+    SensorDescription sensor;
+    sensor.channels = sensor_channels(need(table, "quantum_efficiency", "quantum_efficiency"));
+    need(table, "exposure_s", "exposure_s = number");
+    sensor.exposure_s = number_in(table, "exposure_s", 0.0, 0.0, most, "an exposure time >= 0 s");
+    const toml::node& gain = need(table, "gain_dn", "gain_dn = DN per electron");
+    sensor.gain_dn = number_in(table, "gain_dn", 1.0, 0.0, most, "a gain in DN per electron > 0");
+    if (sensor.gain_dn == 0.0) fail(gain, "a gain in DN per electron > 0", "0");
+    sensor.offset_dn = number_in(table, "offset_dn", 0.0, 0.0, 1e9, "a black level >= 0 DN");
+    sensor.read_noise_dn = number_in(table, "read_noise_dn", 0.0, 0.0, most, "a noise >= 0 DN");
+    sensor.dark_current_electrons_per_s =
+        number_in(table, "dark_current_electrons_per_s", 0.0, 0.0, most, "a dark current >= 0");
+    sensor.full_well_electrons = number_in(table, "full_well_electrons", sensor.full_well_electrons,
+                                           1.0, most, "a full well of at least 1 electron");
+    const double bits = number_in(table, "bits", 0.0, 1.0, 24.0, "1 to 24 bits");
+    if (bits != std::floor(bits)) fail(*table.get("bits"), "1 to 24 bits", std::to_string(bits));
+    sensor.bits = static_cast<int>(bits);
+    sensor.shot_noise = flag(table, "shot_noise", true);
+    if (const toml::node* node = table.get("bayer")) {
+      const char* what = "\"rggb\", \"bggr\", \"grbg\" or \"gbrg\"";
+      try {
+        sensor.bayer = BayerPattern(text(*node, what));
+      } catch (const std::invalid_argument&) {
+        fail(*node, what, described(*node));
+      }
+      std::string names;
+      for (const SensorChannel& channel : sensor.channels) names += channel.name;
+      if (names != "RGB") fail(*node, "quantum efficiencies of R, G and B", "those of " + names);
+    }
+    camera.sensor = std::move(sensor);
   }
 
   std::filesystem::path path_;

@@ -61,9 +61,7 @@ class Renderer {
   // Whether a corner of the pixel sees another surface: a sliver that the points may have missed.
   bool corners_differ(int x, int y, const PixelSum& pixel) const {
     for (int corner = 0; corner < 4; ++corner) {
-      const Ray ray = camera_.ray({x + (corner & 1) + 0.0, y + (corner >> 1) + 0.0});
-      if (seen_by(prediction_.visibility().first_hit(ray.origin_m, ray.direction)) !=
-          pixel.first_seen)
+      if (seen_by(first_hit({x + (corner & 1) + 0.0, y + (corner >> 1) + 0.0})) != pixel.first_seen)
         return true;
     }
     return false;
@@ -74,9 +72,15 @@ class Renderer {
     return !hit ? kNothing : hit->front ? hit->piece : kBack;
   }
 
+  // Nothing, too, where the lens images no direction.
+  std::optional<Visibility::Hit> first_hit(PixelPosition position) const {
+    const auto ray = camera_.ray(position);
+    if (!ray) return std::nullopt;
+    return prediction_.visibility().first_hit(ray->origin_m, ray->direction);
+  }
+
   void add_point(PixelPosition position, PixelSum& pixel, Gather::Scratch& scratch) const {
-    const Ray ray = camera_.ray(position);
-    const auto hit = prediction_.visibility().first_hit(ray.origin_m, ray.direction);
+    const auto hit = first_hit(position);
     const std::uint32_t seen = seen_by(hit);
     if (pixel.points == 0) pixel.first_seen = seen;
     pixel.mixed |= seen != pixel.first_seen;

@@ -8,9 +8,9 @@
 #include <fstream>
 #include <iterator>
 
+#include "image/bayer.h"
 #include "image/image_file.h"
 #include "radiometry/input_error.h"
-#include "readings/bayer.h"
 #include "readings/photograph.h"
 #include "support/scratch.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "readings/bayer.h"
+#include "image/bayer.h"
 
 #include <stdexcept>
 
