@@ -3,6 +3,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -98,6 +99,25 @@ class Program : public testing::Test {
 
   fs::path folder_;
 };
+
+// The room seen through a distorting lens onto a 12-bit Bayer sensor.
+std::string room_with_sensor() {
+  return std::string(kSmallRoom) + R"([cameras.eye.lens]
+distortion = { k1 = -0.15, p1 = 0.002 }
+f_number = 8
+vignetting = { cos4 = true }
+point_spread_um = 800
+veiling_glare = 0.01
+[cameras.eye.sensor]
+exposure_s = 1e-6
+gain_dn = 0.5
+offset_dn = 64
+read_noise_dn = 2
+bits = 12
+bayer = "rggb"
+quantum_efficiency = { R = 0.3, G = 0.4, B = 0.2 }
+)";
+}
 
 TEST_F(Program, EveryCommandHasHelpWithAnExample) {
   for (const char* command : {"", "demo", "plan", "solve", "probe", "render", "calibrate", "fit",
@@ -253,6 +273,57 @@ TEST_F(Program, ThreadsDoNotChangeANumber) {
   const auto one = nlohmann::json::parse(text_of(file("t1.json")));
   const auto two = nlohmann::json::parse(text_of(file("t2.json")));
   EXPECT_EQ(one["surfaces"], two["surfaces"]);
+}
+
+TEST_F(Program, SimulatedPhotographCarriesItsTruthAndItsName) {
+  const std::string scene = write("sensor.toml", room_with_sensor());
+  const auto photograph = [&](const std::string& name, const std::string& more) {
+    return run("render " + scene + " --elements 200 --auto-exposure 0.8 " + more + " -o " +
+               file(name));
+  };
+  const Outcome first = photograph("a.tif", "--threads 1");
+  ASSERT_EQ(first.code, 0) << first.text;
+  EXPECT_THAT(first.text, HasSubstr("simulated photograph"));
+  ASSERT_EQ(photograph("b.png", "--threads 2").code, 0);
+  ASSERT_EQ(photograph("c.exr", "--counts --noise-seed 2").code, 0);
+  const Image tif = read_image(file("a.tif")), png = read_image(file("b.png"));
+  const Image exr = read_image(file("c.exr")), truth = read_image(file("a.truth.exr"));
+  ASSERT_EQ(tif.channels.size(), 1u) << "a mosaic";
+  EXPECT_EQ(tif.channels[0].samples, png.channels[0].samples) << "same seed, other threads";
+  EXPECT_NE(tif.channels[0].samples, exr.channels[0].samples) << "another seed";
+  EXPECT_THAT(exr.attributes.at("simulated"), HasSubstr("not measured"));
+  for (const char* name : {"a.tif", "b.png"})
+    EXPECT_THAT(text_of(file(name)), HasSubstr("simulated photograph")) << name;
+  EXPECT_EQ(spectral_channels(truth).indices.size(), 3u) << "the noise-free radiance";
+  const Channel* expected = truth.find("expected.Y");
+  const Channel* variance = truth.find("variance.Y");
+  ASSERT_TRUE(expected && variance && truth.find("clipped.Y"));
+  double chi2 = 0.0;
+  for (std::size_t i = 0; i < tif.pixel_count(); ++i)
+    chi2 += std::pow(tif.channels[0].samples[i] - expected->samples[i], 2) / variance->samples[i] /
+            static_cast<double>(tif.pixel_count());
+  EXPECT_LT(std::abs(chi2 - 1.0), 3.9 * std::sqrt(2.0 / 192.0)) << "192 photosites, level 0.01 %";
+  const auto json = nlohmann::json::parse(text_of(file("a.json")));
+  EXPECT_TRUE(json.at("simulated").get<bool>());
+  EXPECT_EQ(json.at("truth"), "a.truth.exr");
+  EXPECT_EQ(json.at("lens").at("distortion_opencv").at("k1"), -0.15);
+  EXPECT_EQ(json.at("saturated_samples"), 0);
+}
+
+TEST_F(Program, SensorCountsNeedASensorThatFitsTheFile) {
+  const std::string scene = write("sensor.toml", room_with_sensor());
+  EXPECT_EQ(run("render " + room() + " -o " + file("a.tif")).code, 4) << "no sensor";
+  EXPECT_EQ(run("render " + scene + " -o " + file("a.jpg")).code, 4);
+  EXPECT_EQ(run("render " + scene + " --counts -o " + file("a.jpg")).code, 4);
+  EXPECT_EQ(run("render " + scene + " --exposure -1 -o " + file("a.tif")).code, 64);
+  EXPECT_EQ(run("render " + scene + " --exposure 1 --auto-exposure 1 -o " + file("a.tif")).code,
+            64);
+  std::string text = room_with_sensor();
+  text.replace(text.find("bits = 12"), 9, "bits = 20");
+  const Outcome deep = run("render " + write("deep.toml", text) + " -o " + file("a.tif"));
+  EXPECT_EQ(deep.code, 4);
+  EXPECT_THAT(deep.text, HasSubstr("1 to 16 bits"));
+  EXPECT_FALSE(fs::exists(file("a.tif")));
 }
 
 }  // namespace
