@@ -59,6 +59,7 @@ const std::vector<ThirdParty>& third_parties() {
       {"Imf", {"solver/image"}},
       {"OpenEXR/", {"solver/image"}},
       {"Imath", {"solver/image"}},
+      {"half.h", {"solver/image"}},  // Imath's
       {"Iex", {"solver/image"}},
       {"png.h", {"solver/image"}},
       {"tiff", {"solver/image"}},
