@@ -109,7 +109,7 @@ std::vector<SolverWork> measure_solvers(const Scene& scene, std::size_t elements
     work.relative_bound = relative_bound;
     SolveOptions options;
     options.relative_bound = relative_bound;
-    const auto solve = [&](SolveMethod method, int& passes) {
+    const auto solve = [&](SolveMethod method, double& passes) {
       options.method = method;
       BandMatrix radiosity;
       SolveSummary summary;

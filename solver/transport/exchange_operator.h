@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+
+#include "mesh/smooth_field.h"
+#include "transport/form_factors.h"
+
+namespace truebox {
+
+/// The symmetric matrix S of exchange areas S_ij = A_i F_ij (m^2), n x n, as the solvers use it:
+/// held in memory, or made anew for every pass.
+class ExchangeOperator {
+ public:
+  virtual ~ExchangeOperator() = default;
+
+  virtual const Eigen::VectorXd& area_m2() const = 0;
+  /// max_i sum_j F_ij.
+  virtual double row_sum_max() const = 0;
+  /// S X: n x n times n x bands, all bands in one pass.
+  virtual BandMatrix product(const BandMatrix& x) const = 0;
+  /// Row i of S, which is its column.
+  virtual void row(Eigen::Index i, Eigen::Ref<Eigen::VectorXd> values) const = 0;
+
+  Eigen::Index size() const { return area_m2().size(); }
+};
+
+/// Form factors that are held in memory; they must outlive the operator.
+class DenseExchange final : public ExchangeOperator {
+ public:
+  explicit DenseExchange(const FormFactors& factors) : factors_(factors) {}
+
+  const Eigen::VectorXd& area_m2() const override { return factors_.area_m2; }
+  double row_sum_max() const override { return factors_.summary.row_sum_max; }
+  BandMatrix product(const BandMatrix& x) const override;
+  void row(Eigen::Index i, Eigen::Ref<Eigen::VectorXd> values) const override;
+
+ private:
+  const FormFactors& factors_;
+};
+
+}  // namespace truebox
