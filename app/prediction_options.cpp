@@ -8,10 +8,27 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
+#include <optional>
 
 #include "scene/scene_file.h"
 
 namespace truebox::app {
+namespace {
+constexpr std::size_t kFirstElements = 1000;  // of a target error: its bound foretells the rest
+
+// "0.5%" or "0.005" as a share.
+std::optional<double> share_of(const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  const std::string rest = end;
+  const double share = rest == "%" ? 0.01 * value : value;
+  if (end == text.c_str() || !(rest.empty() || rest == "%") || !(share > 0.0 && share < 1.0))
+    return std::nullopt;
+  return share;
+}
+
+}  // namespace
 
 void add_prediction_options(CLI::App& command, PredictionArguments& a) {
   command.add_option("SCENE", a.scene, "scene file (TOML)")->required();
@@ -21,12 +38,19 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a) {
   command.add_option("--rays", a.rays, "rays of a pair that something may stand between")
       ->capture_default_str()
       ->check(CLI::Range(4, 4096));
-  command.add_option("--method", a.method, "krylov (conjugate gradients) or gauss-seidel")
+  command.add_option("--method", a.method, "how the radiosity system is solved; see truebox sweep")
       ->capture_default_str()
-      ->check(CLI::IsMember({"krylov", "gauss-seidel"}));
+      ->check(CLI::IsMember(method_names()));
   command.add_option("--solver-bound", a.relative_bound, "stop at this relative error bound")
       ->capture_default_str()
       ->check(CLI::Range(1e-13, 0.5));
+  command
+      .add_option("--target-error", a.target_error,
+                  "choose elements and solver bound so that each surface's mean is bound to this "
+                  "share (\"0.5%\" or 0.005)")
+      ->check([](const std::string& text) {
+        return share_of(text) ? "" : "a share such as 0.5% or 0.005 expected, not " + text;
+      });
   command.add_option("--threads", a.threads, "threads, 0 for all")->check(CLI::Range(0, 1024));
   command.add_flag("--quiet", a.quiet, "no progress");
 }
@@ -53,12 +77,19 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
   PredictOptions options;
   options.elements = a.elements;
   options.form_factors.rays = a.rays;
-  options.solve.method =
-      a.method == "krylov" ? SolveMethod::conjugate_gradient : SolveMethod::gauss_seidel;
+  options.solve.method = method_of_name(a.method);
   options.solve.relative_bound = a.relative_bound;
   options.progress = terminal_progress(a.quiet);
   const auto start = std::chrono::steady_clock::now();
-  predicted->prediction = std::make_unique<Prediction>(predicted->scene, options);
+  if (a.target_error.empty()) {
+    predicted->prediction = std::make_unique<Prediction>(predicted->scene, options);
+  } else {
+    options.elements = std::min(options.elements, kFirstElements);
+    auto targeted = predict_to_target(predicted->scene, options, *share_of(a.target_error));
+    predicted->prediction = std::move(targeted.prediction);
+    predicted->target_steps = std::move(targeted.steps);
+    predicted->misses_target = !targeted.is_reached;
+  }
   predicted->seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return predicted;
@@ -86,6 +117,11 @@ std::string describe(const Predicted& p) {
                    : fmt::format("  the scene is open (no repair); largest row sum {:.6f}\n",
                                  f.row_sum_max);
   text += "  radiosity: " + grid.solve.brief() + "\n";
+  for (const TargetStep& step : p.target_steps)
+    text += fmt::format("  {} elements: means of surfaces bound to {:.3g} %\n", step.elements,
+                        100.0 * step.relative_bound);
+  if (p.misses_target)
+    text += "  the target error is not reached: finer grids do not fit the memory limit\n";
   if (!p.prediction->bound_is_reliable())
     text += fmt::format(
         "  error bound: an estimate only, the grid is too coarse ({} elements a surface; {} "

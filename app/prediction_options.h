@@ -5,7 +5,7 @@
 #include <string>
 
 #include "scene/scene.h"
-#include "transport/prediction.h"
+#include "transport/predict_to_target.h"
 
 namespace CLI {
 class App;
@@ -20,6 +20,7 @@ struct PredictionArguments {
   int rays = FormFactorOptions{}.rays;
   std::string method = "krylov";
   double relative_bound = SolveOptions{}.relative_bound;
+  std::string target_error;  ///< "0.5%" or "0.005": chooses elements and solver bound
   int threads = 0;
   bool quiet = false;
 };
@@ -30,10 +31,12 @@ void add_prediction_options(CLI::App& command, PredictionArguments& arguments);
 struct Predicted {
   Scene scene;
   std::unique_ptr<Prediction> prediction;
+  std::vector<TargetStep> target_steps;  ///< the attempts, where a target error was asked for
+  bool misses_target = false;
   double seconds = 0.0;
 };
 
-/// Reads and solves; shows progress. The caller checks `prediction->outcome()`.
+/// Reads and solves; shows progress. The caller checks `prediction->outcome()` and `misses_target`.
 std::unique_ptr<Predicted> predict(const PredictionArguments& arguments);
 
 /// A progress line on stderr if that is a terminal, nothing otherwise.

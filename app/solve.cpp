@@ -148,7 +148,7 @@ int solve(const SolveArguments& a) {
     write_file_atomically(a.output, solution_json(*predicted).dump(1) + "\n");
   if (extension == ".vtu") write_file_atomically(a.output, solution_vtu(*predicted));
   if (!a.summary.empty()) write_file_atomically(a.summary, summary_json(*predicted).dump(1) + "\n");
-  return kAgrees;
+  return predicted->misses_target ? kNotSolved : kAgrees;
 }
 
 }  // namespace

@@ -38,12 +38,16 @@ struct Scene {
   double metres_per_unit = 1.0;   ///< of the file's length unit
   std::string length_unit = "m";  ///< as the file wrote it
   WavelengthGrid bands;
+  bool is_total = false;    ///< one band over all wavelengths: W m^-2 instead of W m^-2 nm^-1
+  bool is_thermal = false;  ///< a material emits by its temperature: heat is exchanged
   std::vector<Material> materials;
   std::vector<Surface> surfaces;  ///< openings last
   std::map<std::string, CameraDescription> cameras;
 
   const Material& material_of(const Surface& surface) const { return materials[surface.material]; }
   double diameter_m() const;  ///< diagonal of the bounding box of the surfaces
+  /// Unit of radiosity and irradiance.
+  const char* exitance_unit() const { return is_total ? "W m^-2" : Radiosity::unit(); }
 };
 
 }  // namespace truebox

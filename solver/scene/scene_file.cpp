@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "radiometry/input_error.h"
+#include "radiometry/planck.h"
 #include "radiometry/table_file.h"
 
 namespace truebox {
@@ -122,7 +123,15 @@ class Reader {
       return;
     }
     const toml::table& bands = table_of(*node, "a table [bands]");
-    allow_keys(bands, {"from_nm", "to_nm", "step_nm", "centres_nm"});
+    allow_keys(bands, {"from_nm", "to_nm", "step_nm", "centres_nm", "total"});
+    if (const toml::node* total = bands.get("total")) {
+      if (!total->is_boolean() || !*total->value<bool>() || bands.size() > 1)
+        fail(*total, "total = true and nothing else in [bands]", described(*node));
+      // One band over all wavelengths; its centre has no meaning.
+      scene_.bands = WavelengthGrid::from_centres({550.0});
+      scene_.is_total = grey_ = true;
+      return;
+    }
     try {
       if (const toml::node* centres = bands.get("centres_nm")) {
         scene_.bands =
@@ -141,7 +150,9 @@ class Reader {
   // As the file or the source tabulates it; a number holds at all wavelengths.
   TabulatedSpectrum tabulated(const toml::node& node, const char* what) const {
     if (!node.is_table()) return TabulatedSpectrum({550.0}, {number(node, what)});
-    if (grey_) fail(node, "[bands], because a material or camera has a spectrum", "no [bands]");
+    if (grey_)
+      fail(node, "bands by wavelength, because a material or camera has a spectrum",
+           scene_.is_total ? "total = true" : "no [bands]");
     const toml::table& table = *node.as_table();
     try {
       if (table.contains("file")) {
@@ -170,7 +181,7 @@ class Reader {
     const auto& materials = table_of(need(root, "materials", "a table [materials.NAME]"), "tables");
     for (const auto& [key, node] : materials) {
       const toml::table& table = table_of(node, "a table [materials.NAME]");
-      allow_keys(table, {"reflectance", "exitance"});
+      allow_keys(table, {"reflectance", "exitance", "temperature_K"});
       Material material;
       material.name = std::string(key.str());
       const toml::node& rho =
@@ -187,7 +198,26 @@ class Reader {
         for (double e : material.exitance.values)
           if (e < 0.0) fail(*exitance, "exitance >= 0", std::to_string(e));
       }
+      if (const toml::node* temperature = table.get("temperature_K"))
+        add_thermal_emission(*temperature, material);
       scene_.materials.push_back(std::move(material));
+    }
+  }
+
+  // Kirchhoff (1860): an opaque surface emits 1 - rho of what a black one does.
+  void add_thermal_emission(const toml::node& node, Material& material) {
+    const double temperature_K = number(node, "a temperature in K");
+    if (temperature_K < 0.0) fail(node, "a temperature in K, 0 or above", described(node));
+    if (grey_ && !scene_.is_total)
+      fail(node, "[bands] by wavelength, or total = true, to emit in", "no [bands]");
+    scene_.is_thermal = true;
+    for (std::size_t b = 0; b < scene_.bands.size(); ++b) {
+      const double centre = scene_.bands.centre_nm(b), half = 0.5 * scene_.bands.width_nm(b);
+      const double black = scene_.is_total
+                               ? blackbody_exitance(temperature_K)
+                               : mean_planck_exitance(std::max(centre - half, 1e-3 * centre),
+                                                      centre + half, temperature_K);
+      material.exitance[b] += (1.0 - material.reflectance[b]) * black;
     }
   }
 

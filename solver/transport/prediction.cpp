@@ -6,15 +6,12 @@
 
 #include <algorithm>
 
-#include "transport/band_product.h"
 #include "transport/grid_difference.h"
 
 namespace truebox {
 namespace {
 
 using Eigen::Index;
-
-constexpr double kRounding = 1e-12;  // of a clipped Lambert sum, relative; measured below 1e-13
 
 constexpr int kGatherAgainDepth = 3;  // receivers within about half an element of the fine grid
 
@@ -69,7 +66,6 @@ Prediction::Prediction(const Scene& scene, const PredictOptions& options)
     require_memory(uniform_mesh(distinct_scene_, edge_m, 2).size(), options.form_factors);
   for (int k = 2; k >= 0; --k) levels_[k] = solve_level(edge_m, 2 - k, options);
   visibility_ = std::make_unique<Visibility>(fine().mesh, scene);
-  compare_grids();
 }
 
 std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int split,
@@ -99,12 +95,16 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   const FormFactors factors = form_factors(grid.mesh, distinct_scene_, visibility, factor_options);
   grid.usable = factors.usable;
   grid.form_factors = factors.summary;
-  grid.solve =
-      solve_radiosity(factors, rho, source, options.solve, grid.reflected, options.progress);
-  grid.indirect = band_product(factors.exchange_area_m2, grid.reflected);
-  for (Index i = 0; i < grid.indirect.rows(); ++i) grid.indirect.row(i) /= factors.area_m2[i];
-  level->smooth = std::make_unique<SmoothField>(grid.mesh, grid.usable, grid.indirect);
+  grid.solve = solve_radiosity(factors, rho, source, options.solve, grid.reflected,
+                               options.progress, &grid.indirect);
   return level;
+}
+
+const SmoothField& Prediction::Level::smooth() const {
+  std::call_once(smooth_once, [this] {
+    smooth_field = std::make_unique<SmoothField>(solution.mesh, solution.usable, solution.indirect);
+  });
+  return *smooth_field;
 }
 
 SolveOutcome Prediction::outcome() const {
@@ -112,6 +112,14 @@ SolveOutcome Prediction::outcome() const {
     if (level->solution.solve.outcome != SolveOutcome::converged)
       return level->solution.solve.outcome;
   return SolveOutcome::converged;
+}
+
+// The error bound is that of the finest grid's value, |I_h - I_2h|: a third of it moves the value
+// by no more than it allows.
+Eigen::VectorXd Prediction::extrapolated(const Eigen::VectorXd& fine,
+                                         const Eigen::VectorXd& coarse) const {
+  if (!bound_is_reliable()) return fine;
+  return (fine + (fine - coarse) / kRichardson).cwiseMax(0.0);
 }
 
 Eigen::VectorXd Prediction::expand(const Eigen::VectorXd& distinct) const {
@@ -145,7 +153,7 @@ BandMatrix Prediction::indirect_from_surfaces(const Level& level, const Vec3& po
       value =
           indirect_from_surfaces(level, at, piece.plane.normal, true).colwise().sum().transpose();
     else
-      level.smooth->evaluate(patch, at, value);
+      level.smooth().evaluate(patch, at, value);
     level.gather->add_direct(at, piece.plane.normal, value, source_scratch);
     value = value.cwiseProduct(
         Eigen::Map<const Eigen::VectorXd>(rho.data(), static_cast<Index>(rho.size())));
@@ -163,7 +171,8 @@ BoundedIrradiance Prediction::irradiance_at(const Vec3& point, const Vec3& norma
     std::array<BandMatrix, 3> gathered;
     for (std::size_t k = 0; k < 3; ++k)
       gathered[k] = indirect_from_surfaces(*levels_[k], point, normal, false);
-    value += gathered[0].colwise().sum().transpose();
+    const Eigen::VectorXd finest = gathered[0].colwise().sum().transpose();
+    value += extrapolated(finest, gathered[1].colwise().sum().transpose());
     bound = guarded_difference(gathered[0], gathered[1], gathered[2], kGatheredOrder)
                 .colwise()
                 .sum()
@@ -179,9 +188,9 @@ BoundedIrradiance Prediction::irradiance_on(std::uint32_t piece, const Vec3& poi
   const auto bands = static_cast<Index>(distinct_scene_.bands.size());
   Eigen::VectorXd value = Eigen::VectorXd::Zero(bands), bound = Eigen::VectorXd::Zero(bands);
   if (needs_.interreflection) {
-    const std::uint32_t patch = levels_[0]->smooth->find_patch(piece, point);
-    levels_[0]->smooth->evaluate(patch, point, value);
-    bound = indirect_bound_.row(patch).transpose();
+    const std::uint32_t patch = levels_[0]->smooth().find_patch(piece, point);
+    levels_[0]->smooth().evaluate(patch, point, value);
+    bound = indirect_bound().row(patch).transpose();
   }
   levels_[0]->gather->add_direct(point, fine().mesh.pieces[piece].plane.normal, value, scratch);
   bound += kRounding * value;
@@ -213,7 +222,7 @@ BandMatrix Prediction::radiosity_bound() const {
   BandMatrix all(rho.rows(), rho.cols());
   for (Index i = 0; i < all.rows(); ++i) {
     const Eigen::VectorXd bound =
-        indirect_bound_.row(i).transpose() + kRounding * fine().direct.row(i).transpose();
+        indirect_bound().row(i).transpose() + kRounding * fine().direct.row(i).transpose();
     all.row(i) = rho.row(i).cwiseProduct(expand(bound).transpose());
   }
   return all;

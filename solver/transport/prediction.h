@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <mutex>
+#include <optional>
 
 #include "mesh/smooth_field.h"
 #include "scene/requirements.h"
@@ -74,6 +76,12 @@ class Prediction {
   BoundedIrradiance irradiance_on(std::uint32_t piece, const Vec3& point,
                                   Gather::Scratch& scratch) const;
 
+  /// Mean irradiance of the part of a convex polygon that lies on surfaces facing along its normal;
+  /// elements that lie wholly inside count by their own means, which converge faster than values at
+  /// points. The bound takes p = 1, element by element of the next grid, without sign. Empty if no
+  /// lit surface is there.
+  std::optional<BoundedIrradiance> mean_irradiance_over(const Polygon& polygon) const;
+
   /// Radiosity of each element of the fine grid and its bound, elements x bands of the scene.
   BandMatrix radiosity() const;
   BandMatrix radiosity_bound() const;
@@ -89,12 +97,23 @@ class Prediction {
     GridSolution solution;
     int split = 0;  // halvings of the coarsest elements
     std::unique_ptr<Gather> gather;
-    std::unique_ptr<SmoothField> smooth;
+
+    /// Built when first asked for: means need none.
+    const SmoothField& smooth() const;
+
+   private:
+    mutable std::once_flag smooth_once;
+    mutable std::unique_ptr<SmoothField> smooth_field;
   };
 
   std::unique_ptr<Level> solve_level(double edge_m, int split, const PredictOptions& options) const;
-  void compare_grids();
-  void share_bounds_at_contacts();
+  /// Bound of the indirect irradiance within each element, found when first asked for.
+  const BandMatrix& indirect_bound() const;
+  void compare_grids() const;
+  void share_bounds_at_contacts() const;
+  Eigen::VectorXd extrapolated(const Eigen::VectorXd& fine, const Eigen::VectorXd& coarse) const;
+  Eigen::VectorXd indirect_mean(const Level& level, std::uint32_t piece, const Polygon& part) const;
+  Eigen::VectorXd direct_mean(std::uint32_t patch, const Polygon& part, bool is_whole) const;
   BandMatrix indirect_from_surfaces(const Level& level, const Vec3& point, const Vec3& normal,
                                     bool is_secondary) const;
   Eigen::VectorXd expand(const Eigen::VectorXd& distinct) const;
@@ -105,8 +124,8 @@ class Prediction {
   Requirements needs_;
   std::array<std::unique_ptr<Level>, 3> levels_;  // finest first
   std::unique_ptr<Visibility> visibility_;
-  std::vector<std::uint32_t> parent_;  // element of the finest grid -> of the next
-  BandMatrix indirect_bound_;          // elements of the finest grid x distinct bands
+  mutable std::once_flag compared_;
+  mutable BandMatrix indirect_bound_;  // elements of the finest grid x distinct bands
 };
 
 }  // namespace truebox

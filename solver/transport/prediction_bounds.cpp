@@ -45,18 +45,22 @@ Eigen::VectorXd pointwise_factor(const Scene& scene) {
 
 // A solver's bound holds for every element, so for any mean of them.
 Eigen::VectorXd Prediction::solver_bounds() const {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(indirect_bound_.cols());
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(fine().indirect.cols());
   for (const auto& level : levels_) sum += level->solution.solve.error_bound;
   return sum;
 }
 
-void Prediction::compare_grids() {
+const BandMatrix& Prediction::indirect_bound() const {
+  std::call_once(compared_, [this] { compare_grids(); });
+  return indirect_bound_;
+}
+
+void Prediction::compare_grids() const {
   const PatchMesh& mesh = fine().mesh;
   const auto bands = fine().indirect.cols();
   indirect_bound_ = BandMatrix::Zero(fine().indirect.rows(), bands);
   if (!needs_.interreflection) return;
   const Eigen::VectorXd factor = pointwise_factor(distinct_scene_);
-  parent_.resize(mesh.size());
   tbb::parallel_for(
       tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.size())),
       [&](const auto& range) {
@@ -66,11 +70,10 @@ void Prediction::compare_grids() {
           const Patch& patch = mesh.patches[i];
           std::uint32_t element[3] = {i, 0, 0};
           for (int k = 1; k < 3; ++k)
-            element[k] = levels_[k]->smooth->find_patch(patch.piece, patch.centroid);
-          parent_[i] = element[1];
+            element[k] = levels_[k]->smooth().find_patch(patch.piece, patch.centroid);
           if (!fine().usable[i]) continue;
           const auto compare = [&](const Vec3& point) {
-            for (int k = 0; k < 3; ++k) levels_[k]->smooth->evaluate(element[k], point, at[k]);
+            for (int k = 0; k < 3; ++k) levels_[k]->smooth().evaluate(element[k], point, at[k]);
             const Eigen::VectorXd guard = guarded_difference(at[0], at[1], at[2], kSmoothOrder);
             const Eigen::VectorXd own = factor.cwiseProduct((at[0] - at[1]).cwiseAbs());
             indirect_bound_.row(i) =
@@ -87,7 +90,7 @@ void Prediction::compare_grids() {
 
 // Where another surface stands on this one the light turns around its corners within an element:
 // by chance one of them may agree on all grids, so those that meet there share the largest.
-void Prediction::share_bounds_at_contacts() {
+void Prediction::share_bounds_at_contacts() const {
   const PatchMesh& mesh = fine().mesh;
   std::vector<std::vector<std::uint32_t>> patches_at(mesh.vertices.size());
   std::vector<char> is_contact(mesh.vertices.size(), 0);
@@ -118,8 +121,10 @@ BandMatrix Prediction::surface_irradiance_bound() const {
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     if (!fine().usable[i]) continue;
     const double area = mesh.patches[i].area_m2;
-    children.row(parent_[i]) += area * fine().indirect.row(static_cast<Index>(i));
-    children_area[parent_[i]] += area;
+    const Patch& patch = mesh.patches[i];
+    const std::uint32_t parent = levels_[1]->smooth().find_patch(patch.piece, patch.centroid);
+    children.row(parent) += area * fine().indirect.row(static_cast<Index>(i));
+    children_area[parent] += area;
   }
   Eigen::VectorXd area = Eigen::VectorXd::Zero(surfaces);
   BandMatrix sum = BandMatrix::Zero(surfaces, bands);

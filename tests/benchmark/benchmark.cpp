@@ -30,6 +30,18 @@ nlohmann::json as_json(const Accuracy& a) {
           {"covered_share", a.covered}};
 }
 
+nlohmann::json as_json(const ClosedBox& c) {
+  return {{"elements", c.elements},
+          {"threads", c.threads},
+          {"job_s", c.job_s},
+          {"job_cpu_s", c.job_cpu_s},
+          {"cells_s", c.cells_s},
+          {"rms_relative_error", c.rms_error},
+          {"rms_relative_standard_error_of_reference", c.rms_standard_error},
+          {"mean_relative_bound", c.mean_bound},
+          {"covered_share", c.covered}};
+}
+
 nlohmann::json as_json(const Kernels& k) {
   return {{"elements", k.elements},
           {"bands", k.bands},
@@ -55,6 +67,12 @@ void print(const Accuracy& a, double first_s) {
   fmt::print("{:>9}{:>10.3f}{:>9.1f}{:>12.3f}{:>12.3f}{:>12.3f}{:>12.3f}{:>11.1f}\n", a.elements,
              a.solve_s, a.solve_s / first_s, 100.0 * a.rms_error, 100.0 * a.max_error,
              100.0 * a.rms_standard_error, 100.0 * a.mean_bound, 100.0 * a.covered);
+}
+
+void print(const ClosedBox& c) {
+  fmt::print("{:>9}{:>9}{:>10.3f}{:>10.3f}{:>12.3f}{:>12.3f}{:>12.3f}{:>11.1f}\n", c.elements,
+             c.threads, c.job_s, c.job_cpu_s, 100.0 * c.rms_error, 100.0 * c.rms_standard_error,
+             100.0 * c.mean_bound, 100.0 * c.covered);
 }
 
 void print(const Kernels& k) {
@@ -87,9 +105,14 @@ void print(const std::vector<SolverWork>& solvers) {
 int main(int argc, char** argv) {
   CLI::App program{"Speed against accuracy on the measured Cornell Box"};
   std::vector<std::size_t> elements{500, 1000, 2000, 4000};
+  std::vector<std::size_t> closed_elements{300, 600, 1200, 2400};
+  bool only_closed_box = false;
   std::size_t kernel_elements = 2000;
   std::string json_path, reference = TRUEBOX_REFERENCE_DIR;
   program.add_option("--elements", elements, "sizes of the fine grid")->delimiter(',');
+  program.add_option("--closed-box-elements", closed_elements, "sizes for the closed box")
+      ->delimiter(',');
+  program.add_flag("--only-closed-box", only_closed_box, "nothing but the closed box");
   program.add_option("--kernel-elements", kernel_elements, "size of the matrix for the kernels")
       ->capture_default_str();
   program.add_option("--json", json_path, "also write every number as JSON");
@@ -107,13 +130,26 @@ int main(int argc, char** argv) {
       "elements", "solve / s", "ratio", "rms error", "max error", "its floor", "mean bound",
       "covered");
   double first_s = 0.0;
-  for (std::size_t count : elements) {
+  for (std::size_t count : only_closed_box ? std::vector<std::size_t>{} : elements) {
     const Accuracy accuracy = measure_accuracy(scene, reference, count);
     if (first_s == 0.0) first_s = accuracy.solve_s;
     print(accuracy, first_s);
     std::fflush(stdout);
     json["accuracy"].push_back(as_json(accuracy));
   }
+  fmt::print(
+      "\nClosed box, scene file to cell means in 31 bands, relative, in %\n"
+      "{:>9}{:>9}{:>10}{:>10}{:>12}{:>12}{:>12}{:>11}\n",
+      "elements", "threads", "job / s", "CPU / s", "rms error", "its floor", "mean bound",
+      "covered");
+  for (int threads : {1, 2})
+    for (std::size_t count : closed_elements) {
+      const ClosedBox box = measure_closed_box(reference, count, threads);
+      print(box);
+      std::fflush(stdout);
+      json["closed_box"].push_back(as_json(box));
+    }
+  if (only_closed_box) return 0;
   const Kernels kernels = measure_kernels(scene, kernel_elements);
   print(kernels);
   json["kernels"] = as_json(kernels);

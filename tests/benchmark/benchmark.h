@@ -41,6 +41,22 @@ struct Accuracy {
 Accuracy measure_accuracy(const Scene& scene, const std::filesystem::path& reference_dir,
                           std::size_t elements);
 
+/// The whole job on the closed box, scene file to the mean irradiance of its wall cells in 31
+/// bands, against independent path tracing.
+struct ClosedBox {
+  std::size_t elements = 0;
+  int threads = 1;
+  double job_s = 0.0;
+  double job_cpu_s = 0.0;  ///< processor time, all threads: what a busy machine does not change
+  double cells_s = 0.0;    ///< of these, the means of the cells
+  double rms_error = 0.0;
+  double rms_standard_error = 0.0;  ///< of the path tracer
+  double mean_bound = 0.0;
+  double covered = 0.0;  ///< share of errors within bound + 3 standard errors
+};
+ClosedBox measure_closed_box(const std::filesystem::path& reference_dir, std::size_t elements,
+                             int threads);
+
 /// What the machine does, and what the program makes of it.
 struct Kernels {
   std::size_t elements = 0, bands = 0;
@@ -58,7 +74,7 @@ Kernels measure_kernels(const Scene& scene, std::size_t elements);
 /// Work to a relative error bound by both methods on the same form factors.
 struct SolverWork {
   double relative_bound = 0.0;
-  int krylov_passes = 0, gauss_seidel_passes = 0;  ///< over the matrix, all bands at once
+  double krylov_passes = 0.0, gauss_seidel_passes = 0.0;  ///< over the matrix, all bands at once
   double krylov_s = 0.0, gauss_seidel_s = 0.0;
 };
 std::vector<SolverWork> measure_solvers(const Scene& scene, std::size_t elements,
