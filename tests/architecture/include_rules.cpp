@@ -72,6 +72,7 @@ const std::vector<ThirdParty>& third_parties() {
       {"zlib.h", {"reports/document"}},
       {"fmt/", {"reports/"}},
       {"tbb/", {"solver/"}},
+      {"unsupported/Eigen/", {"solver/transport"}},
       {"Eigen/", {"solver/", "calibration/"}, true},
       {"CLI/", {}},
       {"opencv2/", {"calibration/alignment"}},
