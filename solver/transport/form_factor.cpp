@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "transport/bounded_exchange.h"
 #include "transport/quadrature.h"
 
 namespace truebox {
@@ -28,6 +29,18 @@ double contour_sum(const Vec3& point, const Vec3& normal, std::span<const Vec3> 
     previous = &vertex;
   }
   return std::max(0.0, -sum / (2.0 * std::numbers::pi));
+}
+
+// The sum of contour_sum without the signs of its terms.
+double contour_magnitude(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const Vec3 a = polygon[k] - point, b = polygon[(k + 1) % polygon.size()] - point;
+    const Vec3 c = a.cross(b - a);
+    const double sine = c.norm();
+    if (sine > 0.0) sum += std::abs(std::atan2(sine, a.dot(b)) * normal.dot(c) / sine);
+  }
+  return sum / (2.0 * std::numbers::pi);
 }
 
 double radius_about(std::span<const Vec3> polygon, const Vec3& centre) {
@@ -125,7 +138,9 @@ double outer_integral(const EdgePair& e, double s0, double s1, int depth) {
   return sum * 2.0 * radius;
 }
 
-double double_contour(const PlanarPolygon& first, const PlanarPolygon& second, double tolerance) {
+// `magnitude`, if asked for, is the sum of the terms without their signs.
+double double_contour(const PlanarPolygon& first, const PlanarPolygon& second, double tolerance,
+                      double* magnitude) {
   const Polygon &i = first.vertices, &j = second.vertices;
   const double scale = std::max((first.centroid - second.centroid).norm(), 1e-300);
   double sum = 0.0;
@@ -141,13 +156,16 @@ double double_contour(const PlanarPolygon& first, const PlanarPolygon& second, d
       const double cosine = e.u.dot(w);
       if (std::abs(cosine) < 1e-15) continue;
       e.parallel = w.cross(e.u).norm() < 1e-12;
-      sum += cosine * outer_integral(e, 0.0, 1.0, 0);
+      const double term = cosine * outer_integral(e, 0.0, 1.0, 0);
+      sum += term;
+      if (magnitude) *magnitude += std::abs(term) / (2.0 * std::numbers::pi);
     }
   return std::max(0.0, sum / (2.0 * std::numbers::pi));
 }
 
 // Both polygons wholly in front of each other. The smaller one receives.
-double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tolerance) {
+double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tolerance,
+                     double* magnitude) {
   const bool swap =
       j.radius_m < i.radius_m || (j.radius_m == i.radius_m && j.centroid.sum() < i.centroid.sum());
   const PlanarPolygon& receiver = swap ? j : i;
@@ -163,8 +181,34 @@ double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tole
           std::min(nearest, distance_to_segment(receiver.centroid, p[k], p[(k + 1) % p.size()]));
   }
   const int points = gauss_points(receiver.radius_m, nearest, tolerance);
-  return points <= 8 ? lambert_quadrature(receiver, source, points)
-                     : double_contour(receiver, source, tolerance);
+  if (points > 8) return double_contour(receiver, source, tolerance, magnitude);
+  if (magnitude)
+    *magnitude += receiver.area_m2 *
+                  contour_magnitude(receiver.centroid, receiver.plane.normal, source.vertices);
+  return lambert_quadrature(receiver, source, points);
+}
+
+// Bit 0: some of the polygon lies above the plane, bit 1: some below.
+int side_of(const PlanarPolygon& polygon, const Plane& plane) {
+  const double tolerance =
+      kHorizonTolerance * (std::abs(plane.distance_m(polygon.centroid)) + 2.0 * polygon.radius_m);
+  int seen = 0;
+  for (const Vec3& v : polygon.vertices) {
+    const double d = plane.distance_m(v);
+    seen |= (d > tolerance ? 1 : 0) | (d < -tolerance ? 2 : 0);
+  }
+  return seen;
+}
+
+double exchange_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tolerance,
+                   double* magnitude) {
+  const int side_i = side_of(i, j.plane), side_j = side_of(j, i.plane);
+  if (!(side_i & 1) || !(side_j & 1)) return 0.0;
+  if (side_i != 3 && side_j != 3) return unoccluded_m2(i, j, tolerance, magnitude);
+  Polygon part_i, part_j;
+  if (!facing_parts(i, j, part_i, part_j)) return 0.0;
+  return unoccluded_m2(PlanarPolygon(std::move(part_i)), PlanarPolygon(std::move(part_j)),
+                       tolerance, magnitude);
 }
 
 }  // namespace
@@ -190,28 +234,30 @@ PlanarPolygon::PlanarPolygon(Polygon polygon)
       area_m2(area_vector(vertices).norm()),
       radius_m(radius_about(vertices, centroid)) {}
 
+bool facing_parts(const PlanarPolygon& i, const PlanarPolygon& j, Polygon& part_i,
+                  Polygon& part_j) {
+  const int side_i = side_of(i, j.plane), side_j = side_of(j, i.plane);
+  if (!(side_i & 1) || !(side_j & 1)) return false;
+  part_i = i.vertices;
+  part_j = j.vertices;
+  if (side_i == 3) clip(i.vertices, j.plane, kHorizonTolerance * i.radius_m, part_i);
+  if (side_j == 3) clip(j.vertices, i.plane, kHorizonTolerance * j.radius_m, part_j);
+  return !part_i.empty() && !part_j.empty();
+}
+
 double exchange_area_m2(const PlanarPolygon& i, const PlanarPolygon& j, double relative_tolerance) {
-  const auto side = [](const PlanarPolygon& polygon, const Plane& plane) {
-    const double tolerance =
-        kHorizonTolerance * (std::abs(plane.distance_m(polygon.centroid)) + 2.0 * polygon.radius_m);
-    int seen = 0;  // bit 0: some above the horizon, bit 1: some below
-    for (const Vec3& v : polygon.vertices) {
-      const double d = plane.distance_m(v);
-      seen |= (d > tolerance ? 1 : 0) | (d < -tolerance ? 2 : 0);
-    }
-    return seen;
-  };
-  const int side_i = side(i, j.plane), side_j = side(j, i.plane);
-  if (!(side_i & 1) || !(side_j & 1)) return 0.0;
-  if (side_i == 3 || side_j == 3) {
-    Polygon part_i = i.vertices, part_j = j.vertices;
-    if (side_i == 3) clip(i.vertices, j.plane, kHorizonTolerance * i.radius_m, part_i);
-    if (side_j == 3) clip(j.vertices, i.plane, kHorizonTolerance * j.radius_m, part_j);
-    if (part_i.empty() || part_j.empty()) return 0.0;
-    return unoccluded_m2(PlanarPolygon(std::move(part_i)), PlanarPolygon(std::move(part_j)),
-                         relative_tolerance);
-  }
-  return unoccluded_m2(i, j, relative_tolerance);
+  return exchange_m2(i, j, relative_tolerance, nullptr);
+}
+
+BoundedExchange bounded_exchange(const PlanarPolygon& i, const PlanarPolygon& j,
+                                 double relative_tolerance) {
+  double magnitude = 0.0;
+  BoundedExchange result;
+  result.exchange_area_m2 = exchange_m2(i, j, relative_tolerance, &magnitude);
+  // Each term carries some twenty roundings (logarithms, square roots, Gauss sums).
+  constexpr double kRounding = 20.0 * std::numeric_limits<double>::epsilon();
+  result.error_bound_m2 = relative_tolerance * result.exchange_area_m2 + kRounding * magnitude;
+  return result;
 }
 
 }  // namespace truebox

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "transport/exact_visibility.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "transport/nusselt.h"
+#include "transport/quadrature.h"
+#include "transport/split_by_shadows.h"
+#include "transport/view_events.h"
+
+namespace truebox {
+namespace {
+
+constexpr std::size_t kMostCells = 20'000;  // of the first cut; bisection goes on from there
+constexpr double kMostlyVisible = 0.1;      // share from which the hidden part is integrated
+constexpr double kRounding = 100.0 * std::numeric_limits<double>::epsilon();  // of the whole pair
+
+// A bilinear quad of the receiver (a triangle repeats a corner) and what was found on it.
+struct Cell {
+  std::array<Vec3, 4> corners;
+  double area_m2 = 0.0;
+  double value = 0.0, error = 0.0;
+  bool finest_rule = false;
+  bool rougher_in_u = true;
+};
+
+// P3 and P4, the parts of an integrand on [-1, 1] that a 5 point rule sees last.
+double roughness(const std::array<double, 5>& f) {
+  const GaussRule& rule = gauss_rule(5);
+  double p3 = 0.0, p4 = 0.0;
+  for (int i = 0; i < 5; ++i) {
+    const double x = 2.0 * rule.nodes[i] - 1.0, x2 = x * x;
+    p3 += rule.weights[i] * f[i] * 0.5 * (5.0 * x2 - 3.0) * x;
+    p4 += rule.weights[i] * f[i] * 0.125 * ((35.0 * x2 - 30.0) * x2 + 3.0);
+  }
+  return std::abs(p3) + std::abs(p4);
+}
+
+class Integrator {
+ public:
+  Integrator(const PlanarPolygon& receiver, const PlanarPolygon& source,
+             std::span<const Blocker* const> blockers, const ExactVisibilityOptions& options)
+      : receiver_(receiver), source_(source), blockers_(blockers), options_(options) {}
+
+  VisibleExchange run() {
+    for (const Polygon& cell : cells_between_events(receiver_, source_, blockers_, kMostCells))
+      add_cells(cell);
+    double visible = 0.0, hidden = 0.0;
+    for (const Cell& cell : cells_) {
+      const auto& q = cell.corners;
+      const Vec3 middle = q[3] == q[0] ? Vec3((q[0] + q[1] + q[2]) / 3.0)
+                                       : Vec3(0.25 * (q[0] + q[1] + q[2] + q[3]));
+      visible += cell.area_m2 * factor_at(middle, true);
+      hidden += cell.area_m2 * factor_sum(middle, parts_.hidden());
+    }
+    const double all = visible + hidden;
+    VisibleExchange result;
+    integrate_visible_ = options_.nusselt_arcs > 0 || visible < kMostlyVisible * all;
+    BoundedExchange whole;
+    if (!integrate_visible_) whole = bounded_exchange(receiver_, source_, 1e-13);
+    const double rounding = kRounding * all;
+    refine(whole.exchange_area_m2, rounding + whole.error_bound_m2);
+    result.exchange_area_m2 =
+        integrate_visible_ ? value_ : std::max(0.0, whole.exchange_area_m2 - value_);
+    result.error_bound_m2 = error_ + whole.error_bound_m2 + rounding;
+    result.evaluations = evaluations_;
+    result.converged =
+        result.error_bound_m2 <= options_.relative_tolerance * result.exchange_area_m2 ||
+        result.error_bound_m2 <= 2.0 * (rounding + whole.error_bound_m2);
+    return result;
+  }
+
+ private:
+  double factor_sum(const Vec3& point, std::span<const Polygon> parts) const {
+    double sum = 0.0;
+    const Vec3& normal = receiver_.plane.normal;
+    const int arcs = options_.nusselt_arcs;
+    for (const Polygon& part : parts)
+      sum += arcs > 0 ? nusselt_factor(point, normal, part, arcs)
+                      : point_to_polygon(point, normal, part);
+    return sum;
+  }
+
+  double factor_at(const Vec3& point, bool visible) {
+    ++evaluations_;
+    const auto seen = parts_(point, source_.vertices, source_.plane, blockers_);
+    return factor_sum(point, visible ? seen : parts_.hidden());
+  }
+
+  void add_cells(const Polygon& p) {
+    for (std::size_t k = 1; k + 1 < p.size(); k += 2) {
+      const bool quad = k + 2 < p.size();
+      Cell cell;
+      cell.corners = {p[0], p[k], p[k + 1], quad ? p[k + 2] : p[0]};
+      cell.area_m2 = area_vector(cell.corners).norm();
+      if (cell.area_m2 > 1e-18 * receiver_.area_m2) cells_.push_back(cell);
+    }
+  }
+
+  template <int kPoints>
+  double gauss(const Cell& cell, std::array<std::array<double, kPoints>, kPoints>& values) {
+    const GaussRule& rule = gauss_rule(kPoints);
+    const auto& q = cell.corners;
+    const Vec3& normal = receiver_.plane.normal;
+    double sum = 0.0;
+    for (int j = 0; j < kPoints; ++j)
+      for (int i = 0; i < kPoints; ++i) {
+        const double u = rule.nodes[i], v = rule.nodes[j];
+        const Vec3 x = (1 - v) * ((1 - u) * q[0] + u * q[1]) + v * ((1 - u) * q[3] + u * q[2]);
+        const Vec3 du = (1 - v) * (q[1] - q[0]) + v * (q[2] - q[3]);
+        const Vec3 dv = (1 - u) * (q[3] - q[0]) + u * (q[2] - q[1]);
+        values[i][j] = normal.dot(du.cross(dv)) * factor_at(x, integrate_visible_);
+        sum += rule.weights[i] * rule.weights[j] * values[i][j];
+      }
+    return sum;
+  }
+
+  void apply_rough_rules(Cell& cell) {
+    std::array<std::array<double, 2>, 2> two;
+    std::array<std::array<double, 3>, 3> three;
+    const double rough = gauss<2>(cell, two);
+    cell.value = gauss<3>(cell, three);
+    cell.error = std::abs(cell.value - rough);
+  }
+
+  void apply_fine_rule(Cell& cell) {
+    std::array<std::array<double, 5>, 5> five;
+    const double fine = gauss<5>(cell, five);
+    cell.error = std::abs(fine - cell.value);
+    cell.value = fine;
+    cell.finest_rule = true;
+    double in_u = 0.0, in_v = 0.0;
+    const GaussRule& rule = gauss_rule(5);
+    for (int k = 0; k < 5; ++k) {
+      std::array<double, 5> row, column;
+      for (int l = 0; l < 5; ++l) {
+        row[l] = five[l][k];
+        column[l] = five[k][l];
+      }
+      in_u += rule.weights[k] * roughness(row);
+      in_v += rule.weights[k] * roughness(column);
+    }
+    cell.rougher_in_u = in_u > in_v;
+  }
+
+  // Worst cell first: a finer rule, then halves.
+  void refine(double whole, double rounding) {
+    const auto less = [](const Cell& a, const Cell& b) { return a.error < b.error; };
+    for (Cell& cell : cells_) {
+      apply_rough_rules(cell);
+      value_ += cell.value;
+      error_ += cell.error;
+    }
+    std::make_heap(cells_.begin(), cells_.end(), less);
+    const auto target = [&] {
+      const double result = integrate_visible_ ? value_ : whole - value_;
+      return std::max(0.9 * options_.relative_tolerance * result - rounding, 0.5 * rounding);
+    };
+    while (!cells_.empty() && error_ > target() && evaluations_ < options_.most_evaluations) {
+      std::pop_heap(cells_.begin(), cells_.end(), less);
+      Cell cell = cells_.back();
+      cells_.pop_back();
+      if (cell.error == 0.0) break;
+      value_ -= cell.value;
+      error_ -= cell.error;
+      if (!cell.finest_rule) {
+        apply_fine_rule(cell);
+        push(cell, less);
+        continue;
+      }
+      for (Cell half : halves(cell)) {
+        apply_rough_rules(half);
+        apply_fine_rule(half);
+        push(half, less);
+      }
+    }
+    value_ = error_ = 0.0;  // the running sums carry the rounding of all that was taken away
+    for (const Cell& cell : cells_) {
+      value_ += cell.value;
+      error_ += cell.error;
+    }
+  }
+
+  template <class Less>
+  void push(const Cell& cell, const Less& less) {
+    value_ += cell.value;
+    error_ += cell.error;
+    cells_.push_back(cell);
+    std::push_heap(cells_.begin(), cells_.end(), less);
+  }
+
+  static std::array<Cell, 2> halves(const Cell& cell) {
+    const auto& q = cell.corners;
+    std::array<Cell, 2> parts;
+    if (cell.rougher_in_u) {
+      const Vec3 low = 0.5 * (q[0] + q[1]), high = 0.5 * (q[3] + q[2]);
+      parts[0].corners = {q[0], low, high, q[3]};
+      parts[1].corners = {low, q[1], q[2], high};
+    } else {
+      const Vec3 left = 0.5 * (q[0] + q[3]), right = 0.5 * (q[1] + q[2]);
+      parts[0].corners = {q[0], q[1], right, left};
+      parts[1].corners = {left, right, q[2], q[3]};
+    }
+    return parts;
+  }
+
+  const PlanarPolygon& receiver_;
+  const PlanarPolygon& source_;
+  std::span<const Blocker* const> blockers_;
+  const ExactVisibilityOptions& options_;
+  SplitByShadows parts_;
+  std::vector<Cell> cells_;
+  bool integrate_visible_ = true;
+  double value_ = 0.0, error_ = 0.0;
+  std::size_t evaluations_ = 0;
+};
+
+}  // namespace
+
+VisibleExchange visible_exchange(const PlanarPolygon& i, const PlanarPolygon& j,
+                                 std::span<const Blocker* const> blockers,
+                                 const ExactVisibilityOptions& options) {
+  Polygon part_i, part_j;
+  if (!facing_parts(i, j, part_i, part_j)) return {0.0, 0.0, 0, true};
+  const PlanarPolygon a(std::move(part_i)), b(std::move(part_j));
+  return b.radius_m < a.radius_m ? Integrator(b, a, blockers, options).run()
+                                 : Integrator(a, b, blockers, options).run();
+}
+
+}  // namespace truebox

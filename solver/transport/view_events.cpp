@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "transport/view_events.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace truebox {
+namespace {
+
+// Projections that run out to the horizon end where they are this much of the source's height.
+constexpr double kBelowSource = 1e-6;
+
+bool same(const Vec3& a, const Vec3& b, double tolerance) { return (a - b).norm() <= tolerance; }
+
+class EventCutter {
+ public:
+  EventCutter(const PlanarPolygon& receiver, const PlanarPolygon& source,
+              std::span<const Blocker* const> blockers, std::size_t most_cells)
+      : receiver_(receiver),
+        source_(source),
+        blockers_(blockers),
+        most_cells_(most_cells),
+        size_(receiver.radius_m),
+        cells_{receiver.vertices} {}
+
+  std::vector<Polygon> run() {
+    for (const Blocker* blocker : blockers_) {
+      cut_by_plane(*blocker);
+      cut_by_blocker(*blocker);
+    }
+    return std::move(cells_);
+  }
+
+ private:
+  double height(const Vec3& v) const { return receiver_.plane.distance_m(v); }
+
+  void cut_by_plane(const Blocker& blocker) {
+    Polygon crossing;
+    const Polygon& p = receiver_.vertices;
+    for (std::size_t k = 0; k < p.size(); ++k) {
+      const Vec3 &a = p[k], &b = p[(k + 1) % p.size()];
+      const double h = blocker.plane.distance_m(a), g = blocker.plane.distance_m(b);
+      if ((h > 0.0) != (g > 0.0)) crossing.push_back(a + h / (h - g) * (b - a));
+    }
+    if (crossing.size() == 2) cut(crossing[0], crossing[1]);
+  }
+
+  // An edge that two blockers share inside their common outline is no outline of the shadow.
+  bool is_inner_edge(const Blocker& blocker, const Vec3& a, const Vec3& b) const {
+    const double tolerance = 1e-12 * (a - b).norm();
+    const auto sees = [&](const Blocker& other) {  // 1: its front, -1: its back, 0: both
+      bool front = false, behind = false;
+      for (const Vec3& v : receiver_.vertices) {
+        front |= other.plane.distance_m(v) > 0.0;
+        behind |= other.plane.distance_m(v) < 0.0;
+      }
+      return front == behind ? 0 : front ? 1 : -1;
+    };
+    for (const Blocker* other : blockers_) {
+      if (other == &blocker) continue;
+      const Polygon& p = other->polygon;
+      for (std::size_t k = 0; k < p.size(); ++k)
+        if (same(p[k], b, tolerance) && same(p[(k + 1) % p.size()], a, tolerance))
+          return sees(blocker) != 0 && sees(blocker) == sees(*other);
+    }
+    return false;
+  }
+
+  void cut_by_blocker(const Blocker& blocker) {
+    const Polygon& p = blocker.polygon;
+    const std::size_t n = p.size();
+    std::vector<char> inner(n);
+    for (std::size_t k = 0; k < n; ++k) inner[k] = is_inner_edge(blocker, p[k], p[(k + 1) % n]);
+    const Polygon& s = source_.vertices;
+    for (std::size_t k = 0; k < n; ++k) {
+      if (!inner[k])
+        for (const Vec3& q : s) shadow_of_edge(q, p[k], p[(k + 1) % n]);
+      if (inner[k] && inner[(k + n - 1) % n]) continue;
+      for (std::size_t l = 0; l < s.size(); ++l)
+        source_edge_through(p[k], s[l], s[(l + 1) % s.size()]);
+    }
+  }
+
+  // From the source's corner q, edge a-b casts its shadow on the receiver.
+  void shadow_of_edge(const Vec3& q, Vec3 a, Vec3 b) {
+    const double hq = height(q), top = hq * (1.0 - kBelowSource);
+    if (hq <= 0.0 || !keep_heights(a, b, 0.0, top)) return;
+    cut(projected(q, hq, a), projected(q, hq, b));
+  }
+
+  // Edge q-r of the source as the receiver sees it behind the blocker's corner b.
+  void source_edge_through(const Vec3& b, Vec3 q, Vec3 r) {
+    const double hb = height(b);
+    if (hb < 0.0 || !keep_heights(q, r, hb / (1.0 - kBelowSource), HUGE_VAL)) return;
+    if (height(q) > 0.0 && height(r) > 0.0)
+      cut(projected(q, height(q), b), projected(r, height(r), b));
+  }
+
+  // Cuts the segment to heights in [low, high]; false if nothing is left.
+  bool keep_heights(Vec3& a, Vec3& b, double low, double high) const {
+    const double ha = height(a), hb = height(b);
+    if (std::max(ha, hb) < low || std::min(ha, hb) > high) return false;
+    const Vec3 along = b - a;
+    const auto at = [&](double h) { return (h - ha) / (hb - ha); };
+    double from = 0.0, to = 1.0;
+    for (double limit : {low, high}) {
+      const bool a_out = limit == low ? ha < limit : ha > limit;
+      const bool b_out = limit == low ? hb < limit : hb > limit;
+      if (a_out) from = std::max(from, at(limit));
+      if (b_out) to = std::min(to, at(limit));
+    }
+    b = a + to * along;
+    a += from * along;
+    return from < to;
+  }
+
+  // Where the line from q through b meets the receiver's plane.
+  Vec3 projected(const Vec3& q, double height_q, const Vec3& b) const {
+    const double hb = std::max(0.0, height(b));
+    return b + hb / (height_q - hb) * (b - q);
+  }
+
+  void cut(const Vec3& from, const Vec3& to) {
+    const Vec3 along = to - from;
+    const double length = along.norm();
+    if (length < 1e-12 * size_) return;
+    const Vec3 across = receiver_.plane.normal.cross(along) / length;
+    const Plane line{across, across.dot(from)};
+    for (std::size_t c = 0, count = cells_.size(); c < count && cells_.size() < most_cells_; ++c) {
+      if (!crosses_inside(cells_[c], from, along, length)) continue;
+      clip(cells_[c], line, 1e-14 * size_, left_);
+      clip(cells_[c], Plane{-line.normal, -line.offset_m}, 1e-14 * size_, right_);
+      if (left_.empty() || right_.empty()) continue;
+      cells_[c] = left_;
+      cells_.push_back(right_);
+    }
+  }
+
+  bool crosses_inside(const Polygon& cell, const Vec3& from, const Vec3& along,
+                      double length) const {
+    double t0 = 0.0, t1 = 1.0;
+    for (std::size_t k = 0; k < cell.size(); ++k) {
+      const Vec3 inward = receiver_.plane.normal.cross(cell[(k + 1) % cell.size()] - cell[k]);
+      const double scale = inward.norm();
+      if (scale == 0.0) continue;
+      const double start = inward.dot(from - cell[k]) / scale, slope = inward.dot(along) / scale;
+      if (std::abs(slope) < 1e-14 * length) {
+        if (start <= 1e-13 * size_) return false;
+      } else if (slope > 0.0) {
+        t0 = std::max(t0, -start / slope);
+      } else {
+        t1 = std::min(t1, -start / slope);
+      }
+    }
+    return (t1 - t0) * length > 1e-12 * size_;
+  }
+
+  const PlanarPolygon& receiver_;
+  const PlanarPolygon& source_;
+  std::span<const Blocker* const> blockers_;
+  std::size_t most_cells_;
+  double size_;
+  std::vector<Polygon> cells_;
+  Polygon left_, right_;
+};
+
+}  // namespace
+
+std::vector<Polygon> cells_between_events(const PlanarPolygon& receiver,
+                                          const PlanarPolygon& source,
+                                          std::span<const Blocker* const> blockers,
+                                          std::size_t most_cells) {
+  return EventCutter(receiver, source, blockers, most_cells).run();
+}
+
+}  // namespace truebox
