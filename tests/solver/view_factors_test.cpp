@@ -171,7 +171,7 @@ TEST(Planner, TakesTheCheapestThatIsExact) {
   const auto method_of = [&](const Scene& scene) {
     return ViewFactors(scene).between(0, 1, options).method;
   };
-  EXPECT_EQ(method_of(squares_with_blocker({}, 0.0)), ViewFactorMethod::analytic);
+  EXPECT_EQ(method_of(squares_with_blocker(Vec3::Zero(), 0.0)), ViewFactorMethod::analytic);
   EXPECT_EQ(method_of(squares_with_blocker({2.0, 0.0, 0.5}, 0.5)), ViewFactorMethod::analytic)
       << "a blocker beside the shaft";
   EXPECT_EQ(method_of(squares_with_blocker({0.0, 0.0, 1.5}, 0.5)), ViewFactorMethod::analytic)
@@ -212,7 +212,7 @@ TEST(ExactVisibility, SeesThroughAThinSlit) {
   // w -> 0 each point of the floor sees a strip of the ceiling as wide as 2 w; the answer grows
   // linearly with w, so two widths must agree after scaling.
   const auto through = [](double w) {
-    Scene scene = squares_with_blocker({}, 0.0);
+    Scene scene = squares_with_blocker(Vec3::Zero(), 0.0);
     tiny::add_surface(scene, "left",
                       {{-9, -9, 0.5}, {0.5 - w / 2, -9, 0.5}, {0.5 - w / 2, 9, 0.5}, {-9, 9, 0.5}});
     tiny::add_surface(scene, "right",
