@@ -1,26 +1,32 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "transport/shaft.h"
 
+#include <algorithm>
 #include <array>
-#include <cstdint>
+#include <cmath>
+#include <utility>
 
 namespace truebox {
 namespace {
 
-constexpr std::size_t kMostVertices = 32;  // beyond, the answer is "partial"
+constexpr std::size_t kMostVertices = 16;  // beyond, the answer is "partial"
 
-struct Heights {
-  std::array<double, kMostVertices> of{};
+using Heights = std::array<double, kMostVertices>;
+
+struct Sides {
   bool front = false, behind = false;
-
-  Heights(std::span<const Vec3> polygon, const Plane& plane, double tolerance) {
-    for (std::size_t k = 0; k < polygon.size(); ++k) {
-      of[k] = plane.distance_m(polygon[k]);
-      front |= of[k] > tolerance;
-      behind |= of[k] < -tolerance;
-    }
-  }
 };
+
+Sides measure(std::span<const Vec3> polygon, const Plane& plane, double tolerance,
+              Heights& height) {
+  Sides sides;
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    height[k] = plane.distance_m(polygon[k]);
+    sides.front |= height[k] > tolerance;
+    sides.behind |= height[k] < -tolerance;
+  }
+  return sides;
+}
 
 bool any_in_front(std::span<const Vec3> polygon, const Plane& plane, double tolerance) {
   for (const Vec3& v : polygon)
@@ -28,74 +34,79 @@ bool any_in_front(std::span<const Vec3> polygon, const Plane& plane, double tole
   return false;
 }
 
-// Collects crossing points and remembers which edges of the blocker have all of them outside.
-class Crossings {
+// Where crossing points lie of one edge's plane: all outside it, all inside it, or both.
+class EdgeSide {
  public:
-  Crossings(const Blocker& blocker, double tolerance)
-      : blocker_(blocker), tolerance_(tolerance), separates_((1ull << blocker.polygon.size()) - 1) {
-    const Polygon& p = blocker.polygon;
-    for (std::size_t e = 0; e < p.size(); ++e) {
-      const Vec3 along = p[(e + 1) % p.size()] - p[e];
-      outward_[e] = along.cross(blocker.plane.normal) / along.norm();
-    }
-  }
+  explicit EdgeSide(double tolerance) : tolerance_(tolerance) {}
 
-  void add(const Vec3& point) {
-    for (std::size_t e = 0; e < blocker_.polygon.size(); ++e) {
-      const double outside = outward_[e].dot(point - blocker_.polygon[e]);
-      if (outside < -tolerance_) separates_ &= ~(1ull << e);
-      if (outside > tolerance_) inside_ = false;
-    }
+  // The crossing is (h e_b - g e_a) / (h - g) beyond the edge: no division is needed for its sign.
+  void add_segment(double h, double g, double e_a, double e_b) {
+    const double apart = h - g;
+    add(apart > 0.0 ? h * e_b - g * e_a : g * e_a - h * e_b, std::abs(apart) * tolerance_);
   }
-
-  void add_plane_crossings(std::span<const Vec3> polygon, const Heights& height) {
-    for (std::size_t k = 0; k < polygon.size(); ++k) {
-      const std::size_t next = (k + 1) % polygon.size();
-      const double h = height.of[k], g = height.of[next];
-      if (h * g < 0.0) add(polygon[k] + h / (h - g) * (polygon[next] - polygon[k]));
-    }
-  }
-
-  bool separated() const { return separates_ != 0; }
-  bool inside() const { return inside_; }
+  bool all_outside() const { return !some_inside_; }
+  bool all_inside() const { return !some_outside_; }
+  bool decided() const { return some_inside_ && some_outside_; }
 
  private:
-  const Blocker& blocker_;
+  void add(double beyond, double slack) {
+    some_inside_ |= beyond < -slack;
+    some_outside_ |= beyond > slack;
+  }
+
   double tolerance_;
-  std::uint64_t separates_;
-  std::array<Vec3, kMostVertices> outward_;
-  bool inside_ = true;
+  bool some_inside_ = false, some_outside_ = false;
 };
 
 }  // namespace
 
+ShaftBlocker::ShaftBlocker(Blocker convex) : blocker(std::move(convex)) {
+  const Polygon& p = blocker.polygon;
+  for (std::size_t k = 0; k < p.size(); ++k) {
+    const Vec3 outward = (p[(k + 1) % p.size()] - p[k]).cross(blocker.plane.normal).normalized();
+    edges.push_back({outward, outward.dot(p[k])});
+  }
+}
+
+ShaftOcclusion shaft_occlusion(std::span<const Vec3> a, const Plane& plane_a,
+                               std::span<const Vec3> b, const Plane& plane_b,
+                               const ShaftBlocker& blocker, double tolerance_m) {
+  if (std::max(a.size(), b.size()) > kMostVertices) return ShaftOcclusion::partial;
+  Heights height_a, height_b, beyond_a, beyond_b;
+  const Sides side_a = measure(a, blocker.blocker.plane, tolerance_m, height_a);
+  const Sides side_b = measure(b, blocker.blocker.plane, tolerance_m, height_b);
+  if (!(side_a.front || side_b.front) || !(side_a.behind || side_b.behind))
+    return ShaftOcclusion::none;
+  if (!any_in_front(blocker.blocker.polygon, plane_a, tolerance_m) ||
+      !any_in_front(blocker.blocker.polygon, plane_b, tolerance_m))
+    return ShaftOcclusion::none;
+  const bool a_crosses = side_a.front && side_a.behind, b_crosses = side_b.front && side_b.behind;
+  bool inside = !a_crosses && !b_crosses;  // parts on one side of the blocker see each other
+  for (const Plane& edge : blocker.edges) {
+    for (std::size_t k = 0; k < a.size(); ++k) beyond_a[k] = edge.distance_m(a[k]);
+    for (std::size_t l = 0; l < b.size(); ++l) beyond_b[l] = edge.distance_m(b[l]);
+    EdgeSide side(tolerance_m);
+    const auto add = [&](double h, double g, double e, double f) {
+      if (h * g <= 0.0 && std::abs(h - g) > tolerance_m) side.add_segment(h, g, e, f);
+    };
+    for (std::size_t k = 0; k < a.size() && !side.decided(); ++k)
+      for (std::size_t l = 0; l < b.size(); ++l)
+        add(height_a[k], height_b[l], beyond_a[k], beyond_b[l]);
+    // A polygon that crosses the plane meets it along its own edges, too.
+    for (std::size_t k = 0; a_crosses && k < a.size(); ++k)
+      add(height_a[k], height_a[(k + 1) % a.size()], beyond_a[k], beyond_a[(k + 1) % a.size()]);
+    for (std::size_t l = 0; b_crosses && l < b.size(); ++l)
+      add(height_b[l], height_b[(l + 1) % b.size()], beyond_b[l], beyond_b[(l + 1) % b.size()]);
+    if (side.all_outside()) return ShaftOcclusion::none;
+    inside &= side.all_inside();
+  }
+  return inside ? ShaftOcclusion::full : ShaftOcclusion::partial;
+}
+
 ShaftOcclusion shaft_occlusion(std::span<const Vec3> a, const Plane& plane_a,
                                std::span<const Vec3> b, const Plane& plane_b,
                                const Blocker& blocker, double tolerance_m) {
-  if (std::max({a.size(), b.size(), blocker.polygon.size()}) > kMostVertices)
-    return ShaftOcclusion::partial;
-  const Heights height_a(a, blocker.plane, tolerance_m), height_b(b, blocker.plane, tolerance_m);
-  if (!(height_a.front || height_b.front) || !(height_a.behind || height_b.behind))
-    return ShaftOcclusion::none;
-  if (!any_in_front(blocker.polygon, plane_a, tolerance_m) ||
-      !any_in_front(blocker.polygon, plane_b, tolerance_m))
-    return ShaftOcclusion::none;
-  const bool straddles_a = height_a.front && height_a.behind;
-  const bool straddles_b = height_b.front && height_b.behind;
-  Crossings crossings(blocker, tolerance_m);
-  for (std::size_t k = 0; k < a.size(); ++k)
-    for (std::size_t l = 0; l < b.size(); ++l) {
-      const double h = height_a.of[k], g = height_b.of[l];
-      if (h * g > 0.0 || std::abs(h - g) <= tolerance_m) continue;
-      crossings.add(a[k] + h / (h - g) * (b[l] - a[k]));
-      if (!crossings.separated() && !crossings.inside()) return ShaftOcclusion::partial;
-    }
-  if (straddles_a) crossings.add_plane_crossings(a, height_a);
-  if (straddles_b) crossings.add_plane_crossings(b, height_b);
-  if (crossings.separated()) return ShaftOcclusion::none;
-  // Where a polygon crosses the blocker's plane, its parts on the other's side are not hidden.
-  return crossings.inside() && !straddles_a && !straddles_b ? ShaftOcclusion::full
-                                                            : ShaftOcclusion::partial;
+  return shaft_occlusion(a, plane_a, b, plane_b, ShaftBlocker(blocker), tolerance_m);
 }
 
 }  // namespace truebox

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "transport/pair_planner.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "transport/shaft.h"
+
+namespace truebox {
+
+// A walk down two trees at once. Blockers that are still in question live on a stack.
+class PairPlanner::Walk {
+ public:
+  Walk(const PairPlanner& planner, const Visitor& visitor) : planner_(planner), visitor_(visitor) {}
+
+  void run(const Node& a, const Node& b) {
+    stack_.resize(planner_.blockers_.size());
+    std::iota(stack_.begin(), stack_.end(), 0u);
+    descend(a, b, 0);
+  }
+
+ private:
+  const Plane& plane_of(const Node& node) const { return planner_.mesh_.pieces[node.piece].plane; }
+
+  bool any_in_front(const Node& node, const Plane& plane) const {
+    return std::any_of(node.outline.begin(), node.outline.end(),
+                       [&](const Vec3& v) { return plane.distance_m(v) > planner_.tolerance_m_; });
+  }
+
+  // Keeps the blockers that may stand in the shaft on top of the stack; false if one closes it.
+  bool keep_blockers(const Node& a, const Node& b, std::size_t from, std::size_t to) {
+    const Eigen::AlignedBox3d hull = a.box.merged(b.box);
+    for (std::size_t k = from; k < to; ++k) {
+      const std::uint32_t id = stack_[k];
+      const std::uint32_t piece = planner_.piece_of_blocker_[id];
+      if (piece == a.piece || piece == b.piece || !hull.intersects(planner_.blocker_box_[id]))
+        continue;
+      switch (shaft_occlusion(a.outline, plane_of(a), b.outline, plane_of(b),
+                              planner_.shaft_blockers_[id], planner_.tolerance_m_)) {
+        case ShaftOcclusion::full: return false;
+        case ShaftOcclusion::partial: stack_.push_back(id); break;
+        case ShaftOcclusion::none: break;
+      }
+    }
+    return true;
+  }
+
+  void descend(const Node& a, const Node& b, std::size_t from) {
+    if (!any_in_front(a, plane_of(b)) || !any_in_front(b, plane_of(a))) return;
+    const std::size_t to = stack_.size();
+    if (!keep_blockers(a, b, from, to)) {
+      visitor_.hidden(static_cast<std::size_t>(a.end - a.begin) * (b.end - b.begin));
+    } else if (stack_.size() == to) {
+      visitor_.unoccluded(patches(a), patches(b));
+    } else if (a.left == 0 && b.left == 0) {
+      visitor_.partial(planner_.order_[a.begin], planner_.order_[b.begin],
+                       {stack_.data() + to, stack_.size() - to});
+    } else if (b.left == 0 || (a.left != 0 && a.size_m >= b.size_m)) {
+      descend(planner_.nodes_[a.left], b, to);
+      descend(planner_.nodes_[a.right], b, to);
+    } else {
+      descend(a, planner_.nodes_[b.left], to);
+      descend(a, planner_.nodes_[b.right], to);
+    }
+    stack_.resize(to);
+  }
+
+  std::span<const std::uint32_t> patches(const Node& node) const {
+    return {planner_.order_.data() + node.begin, node.end - node.begin};
+  }
+
+  const PairPlanner& planner_;
+  const Visitor& visitor_;
+  std::vector<std::uint32_t> stack_;
+};
+
+PairPlanner::PairPlanner(const PatchMesh& mesh, const Scene& scene,
+                         const std::vector<PlanarPolygon>& patches, double tolerance_m,
+                         bool occlusion)
+    : mesh_(mesh), patches_(patches), tolerance_m_(tolerance_m) {
+  for (std::uint32_t p = 0; p < mesh.pieces.size() && occlusion; ++p) {
+    const Piece& piece = mesh.pieces[p];
+    if (scene.surfaces[piece.surface].is_opening) continue;
+    blockers_.push_back({piece.polygon, piece.plane});
+    shaft_blockers_.emplace_back(blockers_.back());
+    piece_of_blocker_.push_back(p);
+    blocker_box_.emplace_back();
+    for (const Vec3& v : piece.polygon) blocker_box_.back().extend(v);
+    // Boxes of flat pieces are thin: rounding must not pull them out of a shaft.
+    blocker_box_.back().min().array() -= tolerance_m;
+    blocker_box_.back().max().array() += tolerance_m;
+  }
+  order_.resize(mesh.size());
+  std::iota(order_.begin(), order_.end(), 0u);
+  leaf_.resize(mesh.size());
+  nodes_.emplace_back();  // index 0 means "none"
+  constexpr std::uint32_t kPatchesATask = 64;
+  std::vector<std::vector<std::uint32_t>> groups(mesh.pieces.size());
+  for (std::uint32_t p = 0; p < mesh.pieces.size(); ++p) {
+    const Piece& piece = mesh.pieces[p];
+    const Vec3 u = (piece.polygon[1] - piece.polygon[0]).normalized();
+    root_.push_back(make_node(p, piece.first_patch, piece.first_patch + piece.patch_count, u,
+                              piece.plane.normal.cross(u)));
+    std::vector<std::uint32_t> open = {root_.back()};
+    while (!open.empty()) {
+      const Node& node = nodes_[open.back()];
+      if (node.left == 0 || node.end - node.begin <= kPatchesATask) {
+        groups[p].push_back(open.back());
+        open.pop_back();
+      } else {
+        open.back() = node.left;
+        open.push_back(node.right);
+      }
+    }
+  }
+  for (std::uint32_t p = 0; p < mesh.pieces.size(); ++p)
+    for (std::uint32_t q = p + 1; q < mesh.pieces.size(); ++q)
+      for (std::uint32_t group : groups[p]) tasks_.push_back({group, root_[q]});
+}
+
+std::uint32_t PairPlanner::make_node(std::uint32_t piece, std::uint32_t begin, std::uint32_t end,
+                                     const Vec3& u, const Vec3& v) {
+  const auto index = static_cast<std::uint32_t>(nodes_.size());
+  nodes_.emplace_back();
+  Node node;
+  node.begin = begin;
+  node.end = end;
+  node.piece = piece;
+  if (end - begin == 1) {
+    node.outline = patches_[order_[begin]].vertices;
+    leaf_[order_[begin]] = index;
+  } else {
+    const Vec3& origin = mesh_.pieces[piece].polygon[0];
+    Eigen::AlignedBox2d flat;
+    for (std::uint32_t k = begin; k < end; ++k)
+      for (const Vec3& corner : patches_[order_[k]].vertices)
+        flat.extend(Eigen::Vector2d(u.dot(corner - origin), v.dot(corner - origin)));
+    const auto at = [&](double x, double y) -> Vec3 { return origin + x * u + y * v; };
+    const auto &low = flat.min(), &high = flat.max();
+    node.outline = {at(low.x(), low.y()), at(high.x(), low.y()), at(high.x(), high.y()),
+                    at(low.x(), high.y())};
+    const Vec3& along = flat.sizes().x() >= flat.sizes().y() ? u : v;
+    const std::uint32_t middle = begin + (end - begin) / 2;
+    std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
+                     [&](std::uint32_t i, std::uint32_t j) {
+                       const double a = along.dot(patches_[i].centroid);
+                       const double b = along.dot(patches_[j].centroid);
+                       return a < b || (a == b && i < j);
+                     });
+    node.left = make_node(piece, begin, middle, u, v);
+    node.right = make_node(piece, middle, end, u, v);
+  }
+  for (const Vec3& corner : node.outline) node.box.extend(corner);
+  node.size_m = node.box.diagonal().norm();
+  nodes_[index] = std::move(node);
+  return index;
+}
+
+void PairPlanner::visit(std::size_t task, const Visitor& visitor) const {
+  Walk(*this, visitor).run(nodes_[tasks_[task].a], nodes_[tasks_[task].b]);
+}
+
+void PairPlanner::visit_row(std::uint32_t patch, const Visitor& visitor) const {
+  Walk walk(*this, visitor);
+  const std::uint32_t piece = mesh_.patches[patch].piece;
+  for (std::uint32_t p = 0; p < root_.size(); ++p)
+    if (p != piece) walk.run(nodes_[leaf_[patch]], nodes_[root_[p]]);
+}
+
+}  // namespace truebox
