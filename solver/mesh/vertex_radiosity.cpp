@@ -25,11 +25,12 @@ Eigen::RowVectorXd fitted(const PatchMesh& mesh, const BandMatrix& means, const 
   const Vec3& normal = mesh.plane_of(mesh.patches[group[0]]).normal;
   const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
   const auto n = static_cast<Eigen::Index>(group.size());
+  const double size = std::sqrt(mesh.patches[group[0]].area_m2);
   Eigen::MatrixXd basis(n, 3);
   Eigen::MatrixXd values(n, means.cols());
   for (Eigen::Index i = 0; i < n; ++i) {
     const Patch& patch = mesh.patches[group[static_cast<std::size_t>(i)]];
-    const Vec3 d = (patch.centroid - vertex) / std::sqrt(patch.area_m2 / static_cast<double>(n));
+    const Vec3 d = (patch.centroid - vertex) / size;
     basis.row(i) << 1.0, d.dot(u), d.dot(v);
     values.row(i) = means.row(group[static_cast<std::size_t>(i)]);
   }

@@ -55,12 +55,13 @@ TEST(StripEnclosure, HasTheViewFactorOfCrossedStrings) {
   // 5 of a 3-4-5 duct (3 + 5 - 4) / (2 * 3) = 2/3.
   const double rho = 0.5;
   StripOptions options;
-  options.degree = 5;
+  options.degree = 3;
+  options.finest = 1e-6;
   const StripEnclosure enclosure(duct(1.0), options);
   const StripSolution b = enclosure.solve({0.0, 0.0, rho}, {0.0, 1.0, 0.0});
   EXPECT_LE(std::abs(b.mean_radiosity(2) - rho * 2.0 / 3.0), b.mean_error_bound(2));
-  // The shortest element, 1e-12 of the sides, is where the corner's factor is not resolved.
-  EXPECT_NEAR(b.mean_radiosity(2), rho * 2.0 / 3.0, 1e-10);
+  // Unresolved is the shortest element's factor, 1e-6 of the side.
+  EXPECT_NEAR(b.mean_radiosity(2), rho * 2.0 / 3.0, 1e-6);
 }
 
 TEST(StripEnclosure, BoundHoldsAtEveryDegreeAndShrinksWithIt) {
