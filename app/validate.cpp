@@ -87,7 +87,7 @@ void add_validate_command(CLI::App& program, Action& chosen) {
       "validate", "the program against closed forms and certified values, in digits");
   auto arguments = std::make_shared<ValidateArguments>();
   command->add_option("--only", arguments->only, "one group")
-      ->check(CLI::IsMember({"viewfactors", "furnace", "plates", "cube", "cie171", "cornellbox"}));
+      ->check(CLI::IsMember({"viewfactors", "furnace", "plates", "bases", "cube", "cie171", "cornellbox"}));
   command->add_option("--elements", arguments->elements, "elements of the Cornell Box")
       ->capture_default_str();
   command->add_option("--json", arguments->json, "every check as JSON");

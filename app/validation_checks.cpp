@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "verification/basis_checks.h"
+
 namespace truebox::app {
 
 std::vector<AccuracyCheck> run_validation(const std::filesystem::path& dir, const std::string& only,
@@ -15,6 +17,7 @@ std::vector<AccuracyCheck> run_validation(const std::filesystem::path& dir, cons
       {"viewfactors", [&] { return check_view_factors(dir); }},
       {"furnace", [&] { return check_furnace(dir); }},
       {"plates", [&] { return check_infinite_plates(dir); }},
+      {"bases", [&] { return check_bases(dir); }},
       {"cube", [&] { return check_ceiling_lit_cube(dir); }},
       {"cie171", [&] { return check_cie171(dir); }},
       {"cornellbox", [&] { return check_cornell_box_probes(dir, elements); }},
