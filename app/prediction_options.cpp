@@ -30,7 +30,10 @@ std::optional<double> share_of(const std::string& text) {
 
 }  // namespace
 
-void add_prediction_options(CLI::App& command, PredictionArguments& a) {
+void add_prediction_options(CLI::App& command, PredictionArguments& a,
+                            const std::vector<std::string>& more_methods) {
+  std::vector<std::string> methods = method_names();
+  methods.insert(methods.begin(), more_methods.begin(), more_methods.end());
   command.add_option("SCENE", a.scene, "scene file (TOML)")->required();
   command.add_option("--elements", a.elements, "elements of the fine grid, about")
       ->capture_default_str()
@@ -40,7 +43,7 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a) {
       ->check(CLI::Range(4, 4096));
   command.add_option("--method", a.method, "how the radiosity system is solved; see truebox sweep")
       ->capture_default_str()
-      ->check(CLI::IsMember(method_names()));
+      ->check(CLI::IsMember(methods));
   command.add_option("--solver-bound", a.relative_bound, "stop at this relative error bound")
       ->capture_default_str()
       ->check(CLI::Range(1e-13, 0.5));

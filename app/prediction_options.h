@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "scene/scene.h"
 #include "transport/predict_to_target.h"
@@ -25,7 +26,9 @@ struct PredictionArguments {
   bool quiet = false;
 };
 
-void add_prediction_options(CLI::App& command, PredictionArguments& arguments);
+/// `more_methods` are those that the command itself knows beside the solvers.
+void add_prediction_options(CLI::App& command, PredictionArguments& arguments,
+                            const std::vector<std::string>& more_methods = {});
 
 /// A scene, its prediction and how long the solve took.
 struct Predicted {

@@ -18,22 +18,6 @@ constexpr int kFinestSplit = 2;  // halvings of the coarsest of three grids
 
 constexpr int kGatherAgainDepth = 3;  // receivers within about half an element of the fine grid
 
-Scene only_bands(const Scene& scene, const std::vector<std::size_t>& bands) {
-  Scene part = scene;
-  std::vector<double> centres;
-  centres.reserve(bands.size());
-  for (std::size_t b : bands) centres.push_back(scene.bands.centre_nm(b));
-  part.bands = WavelengthGrid::from_centres(std::move(centres));
-  for (std::size_t m = 0; m < scene.materials.size(); ++m)
-    for (auto [from, to] :
-         {std::pair{&scene.materials[m].reflectance.values, &part.materials[m].reflectance.values},
-          std::pair{&scene.materials[m].exitance.values, &part.materials[m].exitance.values}}) {
-      to->clear();
-      for (std::size_t b : bands) to->push_back((*from)[b]);
-    }
-  return part;
-}
-
 BandMatrix reflectance_of(const PatchMesh& mesh, const Scene& scene) {
   BandMatrix rho(static_cast<Index>(mesh.size()), static_cast<Index>(scene.bands.size()));
   for (Index i = 0; i < rho.rows(); ++i) {
@@ -63,7 +47,8 @@ BandMatrix mean_direct(const PatchMesh& mesh, const Gather& gather, Index bands)
 
 Prediction::Prediction(const Scene& scene, const PredictOptions& options)
     : scene_(&scene), needs_(requirements(scene)) {
-  distinct_scene_ = only_bands(scene, needs_.distinct_bands);
+  require_lambertian(scene);
+  distinct_scene_ = in_bands(scene, needs_.distinct_bands);
   const double edge_m = edge_for_count(scene, std::max<std::size_t>(1, options.elements / 16));
   if (needs_.interreflection)  // the finest grid decides; better told before the others are solved
     require_memory(uniform_mesh(distinct_scene_, edge_m, kFinestSplit).size(),

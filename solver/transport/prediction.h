@@ -68,6 +68,7 @@ struct BoundedIrradiance {
 class Prediction {
  public:
   /// Solves. Check `outcome()` before using the answer. The scene must outlive the prediction.
+  /// InputError if a surface is not Lambertian.
   Prediction(const Scene& scene, const PredictOptions& options);
 
   const Scene& scene() const { return *scene_; }

@@ -15,7 +15,8 @@ using Modules = std::set<std::string>;
 // Modules that each module may include, itself aside. Left to right; solver and reference never
 // meet, only calibration and reports see both.
 const std::map<std::string, Modules>& allowed_modules() {
-  static const Modules kSolver = {"radiometry", "image", "scene", "mesh", "transport", "sensor"};
+  static const Modules kSolver = {"radiometry", "image",     "scene",       "rays",
+                                  "mesh",       "transport", "path_tracer", "sensor"};
   static const Modules kReference = {"provenance", "analytic", "readings"};
   static const auto join = [](Modules a, const Modules& b) {
     a.insert(b.begin(), b.end());
@@ -29,8 +30,11 @@ const std::map<std::string, Modules>& allowed_modules() {
       {"solver/radiometry", {}},
       {"solver/image", {"radiometry"}},
       {"solver/scene", {"radiometry", "image"}},
+      {"solver/rays", {"radiometry", "image", "scene"}},
+      // The independent check: neither mesh nor transport, so that no error is common to both.
+      {"solver/path_tracer", {"radiometry", "image", "scene", "rays"}},
       {"solver/mesh", {"radiometry", "image", "scene"}},
-      {"solver/transport", {"radiometry", "image", "scene", "mesh"}},
+      {"solver/transport", {"radiometry", "image", "scene", "rays", "mesh"}},
       {"solver/sensor", {"radiometry", "image", "scene", "mesh", "transport"}},
       {"reference/provenance", {"radiometry", "image"}},
       {"reference/analytic", {"radiometry", "image", "provenance"}},
@@ -55,7 +59,7 @@ struct ThirdParty {
 
 const std::vector<ThirdParty>& third_parties() {
   static const std::vector<ThirdParty> kTable = {
-      {"embree3/", {"solver/transport"}},
+      {"embree3/", {"solver/rays"}},
       {"Imf", {"solver/image"}},
       {"OpenEXR/", {"solver/image"}},
       {"Imath", {"solver/image"}},
