@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <ImfChannelList.h>
+#include <ImfDeepFrameBuffer.h>
 #include <ImfDeepScanLineOutputFile.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -100,7 +101,8 @@ Imf::FrameBuffer half_buffer(const char* channel, std::vector<half>& values, int
 void write_parts(const std::string& path, int second_width) {
   std::vector<Imf::Header> headers;
   for (int p = 0; p < 2; ++p) {
-    Imf::Header header(p == 0 ? 4 : second_width, 2);
+    Imf::Header header(4, 2);
+    if (p == 1) header.dataWindow().max.x = second_width - 1;
     header.setName(p == 0 ? "beauty" : "denoised");
     header.setType(Imf::SCANLINEIMAGE);
     header.channels().insert("G", Imf::Channel(Imf::HALF));
