@@ -29,6 +29,7 @@ using Action = std::function<int()>;
 void add_calibrate_command(CLI::App& program, Action& chosen);
 void add_compare_command(CLI::App& program, Action& chosen);
 void add_demo_command(CLI::App& program, Action& chosen);
+void add_export_command(CLI::App& program, Action& chosen);
 void add_fit_command(CLI::App& program, Action& chosen);
 void add_plan_command(CLI::App& program, Action& chosen);
 void add_probe_command(CLI::App& program, Action& chosen);

@@ -4,13 +4,16 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "export/solution_files.h"
 #include "image/image_file.h"
 #include "prediction_options.h"
 #include "radiometry/input_error.h"
+#include "walkthrough/walkthrough.h"
 
 namespace truebox::app {
 namespace {
@@ -19,6 +22,12 @@ struct SolveArguments {
   PredictionArguments prediction;
   std::string output, summary;
 };
+
+Observer observer() {
+  return read_observer(
+      std::filesystem::path(reference_directory()) / "colour" / "cie1931_2deg_xyz.csv",
+      "CIE 1931 2 deg");
+}
 
 std::vector<double> values(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
 
@@ -64,54 +73,6 @@ nlohmann::json solution_json(const Predicted& p) {
   return json;
 }
 
-template <class Write>
-std::string data_array(const char* type, const char* name, int components, const Write& write) {
-  std::string text = fmt::format(
-      "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"ascii\">\n", type,
-      name, components);
-  write(text);
-  return text + "</DataArray>\n";
-}
-
-// VTK XML unstructured grid, one polygon an element, cell data one component a band (ParaView).
-std::string solution_vtu(const Predicted& p) {
-  const PatchMesh& mesh = p.prediction->fine().mesh;
-  std::string text = fmt::format(
-      "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" "
-      "byte_order=\"LittleEndian\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" "
-      "NumberOfCells=\"{}\">\n<Points>\n",
-      mesh.vertices.size(), mesh.size());
-  text += data_array("Float64", "Points", 3, [&](std::string& out) {
-    for (const Vec3& v : mesh.vertices) out += fmt::format("{} {} {}\n", v.x(), v.y(), v.z());
-  });
-  text += "</Points>\n<Cells>\n";
-  text += data_array("Int32", "connectivity", 1, [&](std::string& out) {
-    for (std::uint32_t c : mesh.corners) out += fmt::format("{} ", c);
-  });
-  text += data_array("Int32", "offsets", 1, [&](std::string& out) {
-    for (const Patch& patch : mesh.patches)
-      out += fmt::format("{} ", patch.first_corner + patch.corner_count);
-  });
-  text += data_array("UInt8", "types", 1, [&](std::string& out) {
-    for (std::size_t i = 0; i < mesh.size(); ++i) out += "7 ";  // VTK_POLYGON
-  });
-  text += "</Cells>\n<CellData>\n";
-  const auto matrix = [&](const char* name, const BandMatrix& m) {
-    text += data_array("Float32", name, static_cast<int>(m.cols()), [&](std::string& out) {
-      for (Eigen::Index i = 0; i < m.rows(); ++i) {
-        for (Eigen::Index b = 0; b < m.cols(); ++b) out += fmt::format("{:.7g} ", m(i, b));
-        out += '\n';
-      }
-    });
-  };
-  matrix("radiosity_W_m-2_nm-1", p.prediction->radiosity());
-  matrix("radiosity_error_bound_W_m-2_nm-1", p.prediction->radiosity_bound());
-  text += data_array("Int32", "surface", 1, [&](std::string& out) {
-    for (const Patch& patch : mesh.patches) out += fmt::format("{} ", mesh.surface_of(patch));
-  });
-  return text + "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
-}
-
 void print_surfaces(const Predicted& p) {
   const std::size_t bands = p.scene.bands.size();
   const std::vector<std::size_t> shown =
@@ -132,10 +93,24 @@ void print_surfaces(const Predicted& p) {
   }
 }
 
+// What -o can be, by its ending.
+const std::map<std::string, std::string (*)(const Predicted&)>& writers() {
+  static const std::map<std::string, std::string (*)(const Predicted&)> kWriters = {
+      {".json", [](const Predicted& p) { return solution_json(p).dump(1) + "\n"; }},
+      {".vtu", [](const Predicted& p) { return solution_vtu(*p.prediction); }},
+      {".glb", [](const Predicted& p) { return solution_glb(*p.prediction, observer()); }},
+      {".html", [](const Predicted& p) {
+         return walkthrough_html(*p.prediction, observer(),
+                                 std::filesystem::path(p.scene.path).filename().string());
+       }}};
+  return kWriters;
+}
+
 int solve(const SolveArguments& a) {
-  const auto extension = std::filesystem::path(a.output).extension();
-  if (!a.output.empty() && extension != ".json" && extension != ".vtu")
-    throw InputError(a.output, 0, "an output ending in .json or .vtu", extension.string());
+  const auto writer = writers().find(std::filesystem::path(a.output).extension().string());
+  if (!a.output.empty() && writer == writers().end())
+    throw InputError(a.output, 0, "an output ending in .json, .vtu, .glb or .html",
+                     std::filesystem::path(a.output).extension().string());
   const auto predicted = predict(a.prediction);
   fmt::print("{}", describe(*predicted));
   if (predicted->prediction->outcome() != SolveOutcome::converged) {
@@ -144,9 +119,7 @@ int solve(const SolveArguments& a) {
     return kNotSolved;
   }
   print_surfaces(*predicted);
-  if (extension == ".json")
-    write_file_atomically(a.output, solution_json(*predicted).dump(1) + "\n");
-  if (extension == ".vtu") write_file_atomically(a.output, solution_vtu(*predicted));
+  if (!a.output.empty()) write_file_atomically(a.output, writer->second(*predicted));
   if (!a.summary.empty()) write_file_atomically(a.summary, summary_json(*predicted).dump(1) + "\n");
   return predicted->misses_target ? kNotSolved : kAgrees;
 }
@@ -158,7 +131,8 @@ void add_solve_command(CLI::App& program, Action& chosen) {
   auto arguments = std::make_shared<SolveArguments>();
   add_prediction_options(*command, arguments->prediction);
   command->add_option("-o,--output", arguments->output,
-                      "means of the surfaces (.json) or all elements (.vtu, ParaView)");
+                      "means of the surfaces (.json) or all elements (.vtu for ParaView, .glb, "
+                      ".html to walk through)");
   command->add_option("--summary", arguments->summary, "how the solve went, as JSON");
   command->footer("Example: truebox solve reference/cornell_box/cornell_box.toml -o box.vtu");
   command->callback([=, &chosen] { chosen = [=] { return solve(*arguments); }; });

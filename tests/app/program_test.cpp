@@ -121,11 +121,33 @@ quantum_efficiency = { R = 0.3, G = 0.4, B = 0.2 }
 
 TEST_F(Program, EveryCommandHasHelpWithAnExample) {
   for (const char* command : {"", "demo", "plan", "solve", "probe", "render", "calibrate", "fit",
-                              "compare", "report", "validate"}) {
+                              "compare", "report", "validate", "export"}) {
     const Outcome help = run(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0) << command;
     EXPECT_THAT(help.text, HasSubstr("Example")) << command;
   }
+}
+
+TEST_F(Program, ExportsToEveryFormat) {
+  for (const std::string to : {"mitsuba", "pbrt", "radiance", "obj", "gltf"}) {
+    const Outcome done = run("export " + room() + " --to " + to + " -o " + file(to));
+    EXPECT_EQ(done.code, 0) << done.text;
+    EXPECT_THAT(done.text, HasSubstr("/" + to + "/scene."));
+    EXPECT_FALSE(fs::is_empty(folder_ / to));
+  }
+  EXPECT_EQ(run("export " + room() + " --to povray -o x").code, 64);
+  EXPECT_EQ(run("export " + room() + " --to pbrt -o " + file("x.rad")).code, 4);
+  EXPECT_EQ(run("export " + room() + " --to obj --rgb-bands 1 2 3 -o " + file("x")).code, 4);
+  EXPECT_FALSE(fs::exists(file("x")));
+}
+
+TEST_F(Program, SolvesIntoEveryKindOfFile) {
+  for (const char* name : {"s.json", "s.vtu", "s.glb", "s.html"}) {
+    const Outcome done = run("solve " + room() + " --elements 100 -o " + file(name));
+    EXPECT_EQ(done.code, 0) << done.text;
+    EXPECT_GT(text_of(file(name)).size(), 1000u) << name;
+  }
+  EXPECT_EQ(run("solve " + room() + " -o " + file("s.stl")).code, 4);
 }
 
 TEST_F(Program, WrongUsageIs64) {

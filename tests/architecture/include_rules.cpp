@@ -15,8 +15,8 @@ using Modules = std::set<std::string>;
 // Modules that each module may include, itself aside. Left to right; solver and reference never
 // meet, only calibration and reports see both.
 const std::map<std::string, Modules>& allowed_modules() {
-  static const Modules kSolver = {"radiometry", "image",     "scene",       "rays",
-                                  "mesh",       "transport", "path_tracer", "sensor"};
+  static const Modules kSolver = {"radiometry", "image",       "scene",  "rays",  "mesh",
+                                  "transport",  "path_tracer", "sensor", "export"};
   static const Modules kReference = {"provenance", "analytic", "readings"};
   static const auto join = [](Modules a, const Modules& b) {
     a.insert(b.begin(), b.end());
@@ -36,6 +36,7 @@ const std::map<std::string, Modules>& allowed_modules() {
       {"solver/mesh", {"radiometry", "image", "scene"}},
       {"solver/transport", {"radiometry", "image", "scene", "rays", "mesh"}},
       {"solver/sensor", {"radiometry", "image", "scene", "mesh", "transport"}},
+      {"solver/export", {"radiometry", "image", "scene", "mesh", "transport"}},
       {"reference/provenance", {"radiometry", "image"}},
       {"reference/analytic", {"radiometry", "image", "provenance"}},
       {"reference/readings", {"radiometry", "image", "provenance", "analytic"}},
@@ -47,7 +48,8 @@ const std::map<std::string, Modules>& allowed_modules() {
       {"reports/difference", kBoth},
       {"reports/colour", join(kBoth, {"difference"})},
       {"reports/figures", join(kBoth, {"difference", "colour"})},
-      {"reports/document", join(kBoth, {"difference", "colour", "figures"})}};
+      {"reports/document", join(kBoth, {"difference", "colour", "figures"})},
+      {"reports/walkthrough", join(kBoth, {"difference", "colour", "figures", "document"})}};
   return kAllowed;
 }
 
@@ -65,6 +67,7 @@ const std::vector<ThirdParty>& third_parties() {
       {"Imath", {"solver/image"}},
       {"half.h", {"solver/image"}},  // Imath's
       {"Iex", {"solver/image"}},
+      {"half.h", {"solver/image"}},  // Imath's
       {"png.h", {"solver/image"}},
       {"tiff", {"solver/image"}},
       {"toml++/", {"solver/scene", "reference/readings"}},
@@ -72,9 +75,9 @@ const std::vector<ThirdParty>& third_parties() {
       {"OpenColorIO/", {"reports/colour"}},
       {"mustache", {"reports/document"}},
       {"kainjow/", {"reports/document"}},
-      {"nlohmann/", {"reports/document"}},
+      {"nlohmann/", {"reports/document", "reports/walkthrough", "solver/export"}},
       {"zlib.h", {"reports/document"}},
-      {"fmt/", {"reports/"}},
+      {"fmt/", {"reports/", "solver/export"}},
       {"tbb/", {"solver/"}},
       {"unsupported/Eigen/", {"solver/transport"}},
       {"Eigen/", {"solver/", "calibration/"}, true},
