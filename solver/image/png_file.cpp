@@ -61,6 +61,11 @@ Image codecs::read_png(const std::filesystem::path& path) try {
         image.channels[c].samples[image.index(x, y)] = static_cast<float>(dn);
       }
   image.attributes["unit"] = "DN";
+  // PNG samples are made for displays: sRGB unless another curve is stated (PNG, 3rd ed., 12.1).
+  if (planes >= 3) {
+    image.attributes["transfer"] = "sRGB";
+    image.attributes["white_dn"] = depth == 16 ? "65535" : "255";
+  }
   return image;
 } catch (const InputError&) {
   throw;
