@@ -36,22 +36,51 @@ std::optional<Image> standard_error(const std::string& path, double samples) {
   return image;
 }
 
-DifferenceMap make_map(const ComparisonArguments& a, const Image& test, const Image& reference) {
+Uncertainties read_uncertainties(const ComparisonArguments& a) {
   Uncertainties u{read_if(a.test_uncertainty), read_if(a.reference_uncertainty),
                   read_if(a.error_bound), read_if(a.mask)};
   if (!a.test_variance.empty()) u.test = standard_error(a.test_variance, a.test_samples);
   if (!a.reference_variance.empty())
     u.reference = standard_error(a.reference_variance, a.reference_samples);
+  return u;
+}
+
+const Image* pointer(const std::optional<Image>& image) { return image ? &*image : nullptr; }
+
+DifferenceMap make_map(const ComparisonArguments& a, const Uncertainties& u, const Image& test,
+                       const Image& reference) {
   DifferenceOptions options;
   options.band_nm = a.band_nm;
-  options.test_uncertainty = u.test ? &*u.test : nullptr;
-  options.reference_uncertainty = u.reference ? &*u.reference : nullptr;
-  options.test_error_bound = u.bound ? &*u.bound : nullptr;
-  options.mask = u.mask ? &*u.mask : nullptr;
+  options.test_uncertainty = pointer(u.test);
+  options.reference_uncertainty = pointer(u.reference);
+  options.test_error_bound = pointer(u.bound);
+  options.mask = pointer(u.mask);
   options.calibration_relative = a.calibration;
   options.test_samples = a.test_samples;
   options.reference_samples = a.reference_samples;
   return difference_map(test, reference, options);
+}
+
+/// The numbers behind the pictures, for the page; one band of several has none.
+std::optional<ImageSet> numbers_of(const ComparisonArguments& a, const Uncertainties& u,
+                                   const Image& test, const Image& reference,
+                                   const std::vector<Region>& regions, const Observer* observer,
+                                   double exposure) {
+  if (a.band_nm) return std::nullopt;
+  ImageSetOptions options;
+  options.quantity = "value";
+  options.exposure = exposure;
+  options.observer = observer;
+  std::vector<int> surface(reference.pixel_count(), -1);
+  for (std::size_t r = 0; r < regions.size(); ++r) {
+    options.surfaces.push_back(regions[r].name);
+    for (std::size_t i : regions[r].pixels) surface[i] = static_cast<int>(r);
+  }
+  if (!regions.empty()) options.surface_of_pixel = surface;
+  const Image* test_u = u.test ? &*u.test : pointer(u.bound);
+  return make_image_set(
+      {"Test", &test, test_u, u.test ? UncertaintyKind::standard : UncertaintyKind::bound},
+      {"Reference", &reference, pointer(u.reference)}, options);
 }
 
 std::map<int, std::string> region_names(const std::string& path) {
@@ -88,10 +117,9 @@ std::optional<Observer> chosen_observer(const std::string& name, const Image& a,
 }
 
 void add_colours(const ComparisonArguments& a, const Image& test, const Image& reference,
-                 Comparison& c) {
-  const auto observer = chosen_observer(a.observer, test, reference);
-  auto t = scene_linear(test, observer ? &*observer : nullptr);
-  auto r = scene_linear(reference, observer ? &*observer : nullptr);
+                 const Observer* observer, Comparison& c) {
+  auto t = scene_linear(test, observer);
+  auto r = scene_linear(reference, observer);
   if (!t || !r) {
     c.left_out.push_back(
         "No colours and no colour differences: neither R, G, B nor two spectral bands.");
@@ -144,13 +172,15 @@ std::vector<Limit> limits_of(const ComparisonArguments& a) {
 
 Comparison compare(const ComparisonArguments& a) {
   const Image test = read_image(a.test), reference = read_image(a.reference);
+  const Uncertainties uncertainties = read_uncertainties(a);
   Comparison c;
-  c.map = make_map(a, test, reference);
+  c.map = make_map(a, uncertainties, test, reference);
   c.statistics = difference_statistics(c.map);
   if (c.map.has_uncertainty())
     c.significance = significance(c.map, {a.coverage_factor, a.level, a.outliers});
   c.significance_judges = a.statistical;
-  add_colours(a, test, reference, c);
+  const auto observer = chosen_observer(a.observer, test, reference);
+  add_colours(a, test, reference, observer ? &*observer : nullptr, c);
   add_metrics(a, c);
   for (const Limit& limit : limits_of(a)) {
     try {
@@ -162,6 +192,8 @@ Comparison compare(const ComparisonArguments& a) {
   const auto regions = read_regions(a, c.map);
   c.region_count = regions.size();
   c.regions = region_differences(c.map, regions);
+  c.image_set = numbers_of(a, uncertainties, test, reference, regions,
+                           observer ? &*observer : nullptr, c.colours ? c.colours->exposure : 1.0);
   return c;
 }
 

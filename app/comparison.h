@@ -67,6 +67,7 @@ struct Comparison {
   std::vector<RegionDifference> regions;
   std::size_t region_count = 0;
   std::optional<ComparedColours> colours;
+  std::optional<ImageSet> image_set;  ///< of all bands
   std::vector<std::string> left_out;  ///< what could not be computed, and why
 };
 

@@ -37,6 +37,7 @@ void add_limit_options(CLI::App& command, ComparisonArguments& a) {
                   "percent, sigmas, ciede2000, itp, flip, hdr-flip, dssim, angle; of the whole: "
                   "bias, mae, rmse, relative-bias, relative-mae, relative-rmse, relmse, smape, "
                   "flip-mean and the like")
+      ->allow_extra_args(false)
       ->group(group);
 }
 
@@ -94,6 +95,7 @@ void add_part_options(CLI::App& command, ComparisonArguments& a) {
       ->needs(regions)
       ->group(group);
   command.add_option("--region", a.region_masks, "NAME=MASK, repeatable: a surface by its mask")
+      ->allow_extra_args(false)
       ->group(group);
 }
 

@@ -79,7 +79,7 @@ ShownSides shown_sides(const ComparisonArguments& a, const Comparison& c) {
 PictureRow main_pictures(const Comparison& c, const ShownSides& sides) {
   const int w = c.map.width, h = c.map.height;
   const ShownDifference d = shown_difference(c);
-  return {
+  PictureRow row = {
       {{"Reference", plain_picture(w, h, sides.reference.rgb, sides.reference.note),
         "The reference image"},
        {"Test", plain_picture(w, h, sides.test.rgb, sides.test.note),
@@ -88,7 +88,10 @@ PictureRow main_pictures(const Comparison& c, const ShownSides& sides) {
         signed_false_colour(w, h, d.values, symmetric_limit(d.values, 0.99), d.quantity, d.unit),
         "Difference by pixel: " + comparison_sentence(c)}},
       "Grey: no difference. Red: the test is brighter. Blue: it is darker. The scale ends at "
-      "the 99th percentile of the channel with the largest difference."};
+      "the 99th percentile of the channel with the largest difference.",
+      {}};
+  row.image_set = c.image_set;
+  return row;
 }
 
 std::optional<PictureRow> flagged_pictures(const ShownSides& sides) {
@@ -180,6 +183,9 @@ std::string uncertainty_text(const ComparisonArguments& a) {
   if (!a.reference_variance.empty())
     add(fmt::format("measurement: variance from {}, {:g} samples", a.reference_variance,
                     a.reference_samples));
+  for (const auto& [side, samples] :
+       {std::pair{"prediction", a.test_samples}, std::pair{"measurement", a.reference_samples}})
+    if (samples > 0.0) add(fmt::format("{}: Student's t of {:g} samples", side, samples));
   if (a.calibration > 0.0)
     add(fmt::format("calibration: {:g} % of the scale, shared by all pixels",
                     100.0 * a.calibration));

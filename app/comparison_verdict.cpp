@@ -107,6 +107,7 @@ std::string limit_sentence(const LimitResult& r) {
 }
 
 std::string significance_sentence(const Significance& s) {
+  if (s.pixels == 0) return "The images agree: no pixel differs, and none has an uncertainty";
   const double pixels = static_cast<double>(s.pixels);
   return fmt::format(
       "The images {} within k = {:g}: {:.3g} % of {} pixels stand out, {:.3g} % would by chance "

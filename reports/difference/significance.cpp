@@ -53,10 +53,12 @@ Significance significance(const DifferenceMap& map, const SignificanceOptions& o
   double sum = 0.0;
   for (std::size_t i = 0; i < all; ++i) {
     if (!map.counts(i)) continue;
-    ++s.pixels;
     double worst = 0.0;
-    bool known = true;
+    bool known = true, compared = false;
     for (const auto& channel : map.channels) {
+      // Equal and certain, like two black bands: nothing that chance could have moved.
+      if (channel.difference[i] == 0.0f && channel.standard_uncertainty[i] == 0.0f) continue;
+      compared = true;
       const double z = channel.score(i);
       if (std::isnan(z)) {
         known = false;
@@ -73,12 +75,13 @@ Significance significance(const DifferenceMap& map, const SignificanceOptions& o
         s.farthest_at = {static_cast<int>(i % width), static_cast<int>(i / width), channel.name};
       }
     }
+    s.pixels += compared;
     s.not_finite += !known;
     s.beyond += worst > s.beyond_limit;
   }
   const double n = s.degrees_of_freedom;
-  if (n == 0.0) {
-    s.outcome = Agreement::fails;
+  if (n == 0.0) {  // equal everywhere without any doubt, or not known anywhere
+    s.outcome = s.not_finite > 0 ? Agreement::fails : Agreement::agrees;
     return s;
   }
   s.mean_z = sum / n;

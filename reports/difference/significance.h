@@ -28,7 +28,9 @@ struct ScoreBin {
 /// Does one stand out that even a family of this size should not hold? (Sidak; warns: a single
 /// pixel does not fail a million.) A pixel counts by its worst channel, its k widened for their
 /// number, which is exact for independent channels and on the safe side for correlated ones.
-/// Pixels are taken as independent of each other; a shared calibration error makes them less so.
+/// Samples that are equal and have u = 0 (both black) are left out: chance could not have moved
+/// them. Pixels are taken as independent of each other; a shared calibration error makes them less
+/// so.
 struct Significance {
   SignificanceOptions options;
   std::size_t pixels = 0;

@@ -83,7 +83,7 @@ TEST_F(Compare, SaysHowFarFromTheLimit) {
   save("test.exr", test);
   const Outcome agrees = run("compare " + pair() + " --percent --fail 6");
   EXPECT_EQ(agrees.code, 0) << agrees.text;
-  EXPECT_THAT(agrees.text, HasSubstr("3 % at pixel (4, 5)"));
+  EXPECT_THAT(agrees.text, HasSubstr("3.000 % at pixel (4, 5)"));
   EXPECT_THAT(agrees.text, HasSubstr("50 % of the limit 6"));
   EXPECT_EQ(run("compare " + pair() + " --relative --warn 0.02 --fail 0.05").code, 1);
   EXPECT_EQ(run("compare " + pair() + " --limit relative:1%:2%").code, 2);

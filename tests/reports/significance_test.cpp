@@ -132,6 +132,21 @@ TEST(Significance, APixelWithoutAnUncertaintyFails) {
   EXPECT_THROW(significance(difference_map(test, reference)), std::invalid_argument);
 }
 
+TEST(Significance, TwoBlackPixelsAreNoEvidence) {
+  Image test = plane(4, 1, 0), reference = plane(4, 1, 0), u = plane(4, 1, 0);
+  DifferenceOptions options;
+  options.test_uncertainty = &u;
+  EXPECT_EQ(significance(difference_map(test, reference, options)).pixels, 0u);
+  EXPECT_EQ(significance(difference_map(test, reference, options)).outcome, Agreement::agrees);
+  u.channels[0].samples[1] = 1.0f;
+  const Significance s = significance(difference_map(test, reference, options));
+  EXPECT_EQ(s.pixels, 1u);
+  EXPECT_EQ(s.degrees_of_freedom, 1.0);
+  test.channels[0].samples[3] = 1e-6f;  // a difference without any uncertainty is infinitely far
+  EXPECT_EQ(significance(difference_map(test, reference, options)).farthest,
+            std::numeric_limits<double>::infinity());
+}
+
 TEST(Uncertainty, CombinesMeasurementPredictionAndCalibration) {
   const Image test = plane(1, 1, 11), reference = plane(1, 1, 10), u = plane(1, 1, 0.3f),
               ur = plane(1, 1, 0.4f), bound = plane(1, 1, 1.2f);
