@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numeric>
 
 #include "acceptance.h"
 #include "comparison.h"
+#include "figures/colour_map.h"
 #include "figures/score_plot.h"
 #include "figures/text.h"
 #include "image/image_file.h"
@@ -55,6 +55,17 @@ Picture thumbnail(int width, int height, const std::vector<std::uint8_t>& rgb) {
             static_cast<std::uint8_t>(sum / std::max(1, count));
       }
   return plain_picture(w, h, small, "");
+}
+
+std::vector<std::uint8_t> difference_colours(const ShownDifference& d) {
+  const double limit = symmetric_limit(d.values, 0.99);
+  std::vector<std::uint8_t> rgb;
+  for (const float v : d.values) {
+    const Rgb8 colour =
+        std::isfinite(v) ? diverging_colour(v / (limit > 0.0 ? limit : 1.0)) : Rgb8{255, 0, 255};
+    rgb.insert(rgb.end(), colour.begin(), colour.end());
+  }
+  return rgb;
 }
 
 /// Both sides as a display shows them; without colours, the worst channel in grey.
@@ -240,11 +251,13 @@ Report comparison_report(const ComparisonArguments& a, const Comparison& c,
   report.sections = {std::move(pictures), std::move(numbers)};
   add_provenance(a, c, sides, report);
   if (thumbnails != nullptr) {
-    const ShownDifference d = shown_difference(c);
     *thumbnails = {
         {"Reference", thumbnail(c.map.width, c.map.height, sides.reference.rgb),
          "The reference image, small"},
-        {"Test", thumbnail(c.map.width, c.map.height, sides.test.rgb), "The test image, small"}};
+        {"Test", thumbnail(c.map.width, c.map.height, sides.test.rgb), "The test image, small"},
+        {"Difference",
+         thumbnail(c.map.width, c.map.height, difference_colours(shown_difference(c))),
+         "The signed difference, small: red is brighter, blue darker"}};
   }
   return report;
 }

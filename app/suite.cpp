@@ -5,7 +5,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <atomic>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -100,9 +99,15 @@ Report suite_report(const Suite& suite, const std::vector<Result>& results,
       worst = &r;
   }
   report.verdict.outcome = worst_outcome(report.checks);
-  report.verdict.sentence =
-      fmt::format("{} of {} comparisons agree; nearest to its limit or farthest beyond is {}: {}",
-                  agreeing, results.size(), worst->entry.name, worst->entry.sentence);
+  const auto count = [&](Agreement outcome) {
+    return std::count_if(results.begin(), results.end(),
+                         [&](const Result& r) { return r.entry.outcome == outcome; });
+  };
+  report.verdict.sentence = fmt::format(
+      "{} of {} comparisons agree, {} warn, {} fail, {} could not be run; {} is {}: {}", agreeing,
+      results.size(), count(Agreement::warning), count(Agreement::fails), count(Agreement::not_run),
+      report.verdict.outcome == Agreement::agrees ? "nearest to its limit" : "worst",
+      worst->entry.name, worst->entry.sentence);
   report.sections = {{"Comparisons", {std::move(table)}}};
   report.provenance = {{"Suite", file}};
   return report;
