@@ -31,7 +31,9 @@ TEST(Distributions, BinomialLimitIsTheFirstCountThatIsRareEnough) {
     for (double p : {0.0, 0.0455, 0.5}) {
       const std::size_t limit = binomial_upper_limit(trials, p, 0.01);
       EXPECT_LE(binomial_upper_tail(limit + 1, trials, p), 0.01);
-      if (limit > 0) EXPECT_GT(binomial_upper_tail(limit, trials, p), 0.01);
+      if (limit > 0) {
+        EXPECT_GT(binomial_upper_tail(limit, trials, p), 0.01);
+      }
     }
 }
 
