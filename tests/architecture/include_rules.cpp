@@ -82,7 +82,9 @@ const std::vector<ThirdParty>& third_parties() {
       {"unsupported/Eigen/", {"solver/transport"}},
       {"Eigen/", {"solver/", "calibration/"}, true},
       {"CLI/", {}},
+      {"opencv2/imgproc", {"reports/difference"}},  // image filters; a package of its own
       {"opencv2/", {"calibration/alignment"}},
+      {"boost/math/", {"calibration/uncertainty"}},
       {"gtest/", {}},
       {"gmock/", {}}};
   return kTable;
