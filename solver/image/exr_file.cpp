@@ -29,15 +29,16 @@ Imf::Slice float_slice(const float* samples, const Imath::Box2i& window, int wid
 Image codecs::read_exr(const std::filesystem::path& path) try {
   Imf::InputFile file(path.c_str(), 1);
   const Imath::Box2i window = file.header().dataWindow();
-  Image image(window.max.x - window.min.x + 1, window.max.y - window.min.y + 1);
   const Imf::ChannelList& list = file.header().channels();
   std::size_t count = 0;
   for (auto it = list.begin(); it != list.end(); ++it, ++count)
     if (it.channel().xSampling != 1 || it.channel().ySampling != 1)
       throw InputError(path.string(), 0, "channels at full resolution",
                        std::string("subsampled channel ") + it.name());
-  if (image.pixel_count() > kMaxPixels || image.pixel_count() * count > kMaxSamples)
-    throw InputError(path.string(), 0, "an image of at most 2^31 samples", "a larger one");
+  require_believable_size(path, std::int64_t{window.max.x} - window.min.x + 1,
+                          std::int64_t{window.max.y} - window.min.y + 1,
+                          static_cast<std::int64_t>(count));
+  Image image(window.max.x - window.min.x + 1, window.max.y - window.min.y + 1);
   for (auto it = list.begin(); it != list.end(); ++it) image.add_channel(it.name());
   Imf::FrameBuffer buffer;
   for (auto& channel : image.channels)
