@@ -64,7 +64,7 @@ std::vector<Bytes> seeds(const FuzzTarget& target) {
 class Fuzz : public testing::TestWithParam<FuzzTarget> {};
 
 TEST_P(Fuzz, ReaderRefusesOrReads) {
-  constexpr int kMutations = 4000;
+  constexpr int kMutations = 2000;
   const std::vector<Bytes> all = seeds(GetParam());
   ASSERT_FALSE(all.empty());
   for (std::size_t s = 0; s < all.size(); ++s)
