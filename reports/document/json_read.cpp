@@ -136,7 +136,12 @@ Report read(const Json& json) {
 
 Report from_json(const std::string& json_text, const std::string& file) {
   try {
-    return read(Json::parse(json_text));
+    // A hostile file may nest without end, and what walks the tree is recursive.
+    constexpr int kDeepest = 64;
+    return read(Json::parse(json_text, [](int depth, Json::parse_event_t, Json&) {
+      if (depth > kDeepest) throw std::invalid_argument("JSON nested deeper than 64 levels");
+      return true;
+    }));
   } catch (const Json::parse_error& error) {
     const auto end =
         json_text.begin() + static_cast<std::ptrdiff_t>(std::min(error.byte, json_text.size()));

@@ -73,13 +73,14 @@ Image codecs::read_exr(const std::filesystem::path& path) try {
   Imf::MultiPartInputFile file(path.c_str(), 1);
   require_flat_parts(path, file);
   const Imath::Box2i window = file.header(0).dataWindow();
-  Image image(window.max.x - window.min.x + 1, window.max.y - window.min.y + 1);
   std::size_t count = 0;
   for (int p = 0; p < file.parts(); ++p)
     for (auto it = file.header(p).channels().begin(); it != file.header(p).channels().end(); ++it)
       ++count;
-  if (image.pixel_count() > kMaxPixels || image.pixel_count() * count > kMaxSamples)
-    throw InputError(path.string(), 0, "an image of at most 2^31 samples", "a larger one");
+  require_believable_size(path, std::int64_t{window.max.x} - window.min.x + 1,
+                          std::int64_t{window.max.y} - window.min.y + 1,
+                          static_cast<std::int64_t>(count));
+  Image image(window.max.x - window.min.x + 1, window.max.y - window.min.y + 1);
   image.channels.reserve(count);
   for (int p = 0; p < file.parts(); ++p) {
     const Imf::Header& header = file.header(p);

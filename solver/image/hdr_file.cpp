@@ -83,8 +83,8 @@ Image codecs::read_hdr(const std::filesystem::path& path) try {
   Bytes bytes{{std::istreambuf_iterator<char>(file), {}}};
   int width = 0, height = 0;
   const double exposure = read_header(bytes, width, height);
+  require_believable_size(path, width, height, 3);
   Image image(width, height);
-  if (image.pixel_count() > kMaxPixels) throw std::runtime_error("more than 2^28 pixels");
   for (const char* name : {"R", "G", "B"}) image.add_channel(name);
   std::vector<unsigned char> rgbe(4 * static_cast<std::size_t>(width));
   for (int y = 0; y < height; ++y) {
@@ -97,6 +97,8 @@ Image codecs::read_hdr(const std::filesystem::path& path) try {
     }
   }
   return image;
+} catch (const InputError&) {
+  throw;
 } catch (const std::exception& error) {
   throw InputError(path.string(), 0, "a complete Radiance picture (RGBE)", error.what());
 }
