@@ -346,6 +346,8 @@ TEST_F(Program, SensorCountsNeedASensorThatFitsTheFile) {
   EXPECT_EQ(deep.code, 4);
   EXPECT_THAT(deep.text, HasSubstr("1 to 16 bits"));
   EXPECT_FALSE(fs::exists(file("a.tif")));
+}
+
 TEST_F(Program, PathsGiveTheSameFileOnAnyNumberOfThreads) {
   const std::string command = "render " + room() + " --method path --samples 32 --seed 7 ";
   for (const std::string threads : {"1", "2"})
