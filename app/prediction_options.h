@@ -22,6 +22,7 @@ struct PredictionArguments {
   std::string method = "krylov";
   double relative_bound = SolveOptions{}.relative_bound;
   std::string target_error;  ///< "0.5%" or "0.005": chooses elements and solver bound
+  bool error_shares = false, sensitivities = false;  ///< as in PredictOptions
   int threads = 0;
   bool quiet = false;
 };

@@ -13,6 +13,7 @@
 #include "image/image_file.h"
 #include "prediction_options.h"
 #include "radiometry/input_error.h"
+#include "transport/net_flux.h"
 #include "walkthrough/walkthrough.h"
 
 namespace truebox::app {
@@ -34,6 +35,14 @@ std::vector<double> values(const Eigen::VectorXd& v) { return {v.data(), v.data(
 nlohmann::json summary_json(const Predicted& p) {
   const GridSolution& grid = p.prediction->fine();
   const FormFactorSummary& f = grid.form_factors;
+  nlohmann::json attempts = nlohmann::json::array();
+  for (const TargetStep& step : p.target_steps)
+    attempts.push_back({{"elements", step.elements}, {"relative_bound", step.relative_bound}});
+  nlohmann::json shares;
+  if (const auto& found = p.prediction->error_shares())
+    shares = {{"discretisation", found->discretisation},
+              {"form_factors", found->form_factors},
+              {"solver", found->solver}};
   return {{"scene", p.scene.path},
           {"elements", grid.mesh.size()},
           {"elements_coarse", p.prediction->coarse().mesh.size()},
@@ -41,6 +50,10 @@ nlohmann::json summary_json(const Predicted& p) {
           {"bands_solved", p.prediction->needs().distinct_bands.size()},
           {"seconds", p.seconds},
           {"plan", p.prediction->needs().reasons},
+          {"largest_relative_bound_of_a_surface", largest_relative_bound(*p.prediction)},
+          {"error_shares", shares},
+          {"target_attempts", attempts},
+          {"target_missed", p.misses_target},
           {"form_factors",
            {{"pairs_unoccluded", f.pairs_unoccluded},
             {"pairs_hidden", f.pairs_hidden},
@@ -55,13 +68,16 @@ nlohmann::json summary_json(const Predicted& p) {
            {{"outcome", grid.solve.brief()},
             {"iterations", grid.solve.iterations},
             {"matrix_passes", grid.solve.matrix_passes},
+            {"bands_reduced", grid.solve.bands_reduced},
             {"residual_history", grid.solve.residual_history}}}};
 }
 
 nlohmann::json solution_json(const Predicted& p) {
   nlohmann::json json = summary_json(p);
-  json["units"] = {
-      {"radiosity", Radiosity::unit()}, {"irradiance", Irradiance::unit()}, {"area", "m^2"}};
+  json["units"] = {{"radiosity", p.scene.exitance_unit()},
+                   {"irradiance", p.scene.exitance_unit()},
+                   {"net_flux", p.scene.is_total ? "W" : "W nm^-1"},
+                   {"area", "m^2"}};
   json["band_centres_nm"] = p.scene.bands.centres_nm();
   json["surfaces"] = nlohmann::json::array();
   for (const SurfaceMean& mean : surface_means(*p.prediction))
@@ -70,6 +86,19 @@ nlohmann::json solution_json(const Predicted& p) {
                                 {"radiosity", values(mean.radiosity)},
                                 {"radiosity_error_bound", values(mean.radiosity_bound)},
                                 {"irradiance", values(mean.irradiance)}});
+  for (const SurfaceFlux& flux : net_fluxes(*p.prediction))
+    for (auto& surface : json["surfaces"])
+      if (surface["name"] == flux.surface) {
+        surface["net_flux"] = values(flux.net_W);
+        surface["net_flux_error_bound"] = values(flux.bound_W);
+      }
+  const auto derivatives = p.prediction->radiosity_by_reflectance();
+  for (std::size_t m = 0; m < derivatives.size(); ++m)
+    for (auto& surface : json["surfaces"])
+      for (std::size_t s = 0; s < p.scene.surfaces.size(); ++s)
+        if (surface["name"] == p.scene.surfaces[s].name)
+          surface["radiosity_by_reflectance"][p.scene.materials[m].name] =
+              values(derivatives[m].row(static_cast<Eigen::Index>(s)).transpose());
   return json;
 }
 
@@ -79,8 +108,12 @@ void print_surfaces(const Predicted& p) {
       bands < 3 ? std::vector<std::size_t>{0}
                 : std::vector<std::size_t>{bands / 4, bands / 2, 3 * bands / 4};
   fmt::print("{:<20}", "mean radiosity of");
-  for (std::size_t b : shown) fmt::print("{:>14.0f} nm{:>10}", p.scene.bands.centre_nm(b), "bound");
-  fmt::print("   ({})\n", Radiosity::unit());
+  for (std::size_t b : shown)
+    fmt::print(
+        "{:>17}{:>10}",
+        p.scene.is_total ? "all wavelengths" : fmt::format("{:.0f} nm", p.scene.bands.centre_nm(b)),
+        "bound");
+  fmt::print("   ({})\n", p.scene.exitance_unit());
   for (const SurfaceMean& mean : surface_means(*p.prediction)) {
     fmt::print("{:<20}", mean.surface);
     for (std::size_t b : shown) {
@@ -90,6 +123,20 @@ void print_surfaces(const Predicted& p) {
       fmt::print("{:>17.6g}{:>8.2f} %", mean.radiosity[k], 100.0 * share);
     }
     fmt::print("\n");
+  }
+}
+
+// Heat that a surface gives or takes, over all bands.
+void print_heat(const Predicted& p) {
+  fmt::print("{:<20}{:>17}{:>14}   (W)\n", "net heat from", "flux", "bound");
+  for (const SurfaceFlux& flux : net_fluxes(*p.prediction)) {
+    double net_W = 0.0, bound_W = 0.0;
+    for (std::size_t b = 0; b < p.scene.bands.size(); ++b) {
+      const double width = p.scene.is_total ? 1.0 : p.scene.bands.width_nm(b);
+      net_W += width * flux.net_W[static_cast<Eigen::Index>(b)];
+      bound_W += width * flux.bound_W[static_cast<Eigen::Index>(b)];
+    }
+    fmt::print("{:<20}{:>17.6g}{:>14.2g}\n", flux.surface, net_W, bound_W);
   }
 }
 
@@ -119,6 +166,7 @@ int solve(const SolveArguments& a) {
     return kNotSolved;
   }
   print_surfaces(*predicted);
+  if (predicted->scene.is_thermal) print_heat(*predicted);
   if (!a.output.empty()) write_file_atomically(a.output, writer->second(*predicted));
   if (!a.summary.empty()) write_file_atomically(a.summary, summary_json(*predicted).dump(1) + "\n");
   return predicted->misses_target ? kNotSolved : kAgrees;
@@ -130,6 +178,10 @@ void add_solve_command(CLI::App& program, Action& chosen) {
   auto* command = program.add_subcommand("solve", "radiosity in every band, with an error bound");
   auto arguments = std::make_shared<SolveArguments>();
   add_prediction_options(*command, arguments->prediction);
+  arguments->prediction.error_shares = true;
+  command->add_flag("--sensitivities", arguments->prediction.sensitivities,
+                    "derivatives of every surface's radiosity by every material's reflectance, "
+                    "into the .json");
   command->add_option("-o,--output", arguments->output,
                       "means of the surfaces (.json) or all elements (.vtu for ParaView, .glb, "
                       ".html to walk through)");
