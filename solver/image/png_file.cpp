@@ -61,7 +61,8 @@ Image codecs::read_png(const std::filesystem::path& path) try {
         image.channels[c].samples[image.index(x, y)] = static_cast<float>(dn);
       }
   image.attributes["unit"] = "DN";
-  // Colours of 8 bit are made for displays; those of 16 bit are a sensor's counts, which are linear.
+  // Colours of 8 bit are made for displays; those of 16 bit are a sensor's counts, which are
+  // linear.
   if (planes >= 3 && depth == 8) {
     image.attributes["transfer"] = "sRGB";
     image.attributes["white_dn"] = "255";
