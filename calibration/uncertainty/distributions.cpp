@@ -22,7 +22,11 @@ double chi_squared_upper_tail(double chi_squared, double degrees_of_freedom) {
   if (!(degrees_of_freedom > 0.0) || std::isnan(chi_squared))
     throw std::invalid_argument("chi^2 needs degrees of freedom and a number");
   if (std::isinf(chi_squared)) return 0.0;
-  return boost::math::gamma_q(degrees_of_freedom / 2.0, std::max(chi_squared, 0.0) / 2.0);
+  const double a = degrees_of_freedom / 2.0, x = std::max(chi_squared, 0.0) / 2.0;
+  // Boost overflows far below the mean of many degrees of freedom (identical images). There the
+  // lower tail is at most exp(a - x + a ln(x / a)) (Chernoff 1952): below 2^-53 it is 1 - 0.
+  if (x == 0.0 || (x < a && a - x + a * std::log(x / a) < -40.0)) return 1.0;
+  return boost::math::gamma_q(a, x);
 }
 
 double binomial_upper_tail(std::size_t count, std::size_t trials, double probability) {

@@ -21,6 +21,17 @@ TEST(Distributions, MatchPrintedTables) {
   EXPECT_NEAR(binomial_upper_tail(8, 10, 0.5), 56.0 / 1024.0, 1e-14);  // 45 + 10 + 1
 }
 
+TEST(Distributions, ChiSquaredOfManyDegreesOfFreedomMayBeNothing) {
+  for (const double chi2 : {0.0, 1e-300, 1.0, 1e5})
+    EXPECT_EQ(chi_squared_upper_tail(chi2, 458752.0), 1.0);
+  EXPECT_EQ(chi_squared_upper_tail(0.0, 1.0), 1.0);
+  // With two degrees of freedom the tail is exp(-chi^2 / 2): no jump where the bound takes over.
+  EXPECT_NEAR(chi_squared_upper_tail(1e-3, 2.0), std::exp(-5e-4), 1e-15);
+  // The median lies 2/3 below the mean: the share above the mean is 1/2 - 1/3 / sqrt(pi n).
+  EXPECT_NEAR(chi_squared_upper_tail(458752.0, 458752.0),
+              0.5 - 1.0 / 3.0 / std::sqrt(3.14159265 * 458752.0), 1e-6);
+}
+
 TEST(Distributions, QuantileUndoesTail) {
   for (double z : {0.1, 1.0, 2.0, 5.0, 8.0})
     EXPECT_NEAR(normal_two_sided_quantile(normal_two_sided_tail(z)), z, 1e-10 * z);
