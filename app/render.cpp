@@ -122,8 +122,9 @@ int render_radiosity(RenderArguments a) {
 
 double median_relative_error(const PathTracedImage& image) {
   std::vector<double> shares;
-  for (std::size_t c = 0; c < image.radiance.channels.size(); ++c)
-    for (std::size_t i = 0; i < image.radiance.pixel_count(); ++i)
+  // The variance's channels: the picture's may have been joined by R, G, B.
+  for (std::size_t c = 0; c < image.variance.channels.size(); ++c)
+    for (std::size_t i = 0; i < image.variance.pixel_count(); ++i)
       if (const double value = image.radiance.channels[c].samples[i]; value > 0.0)
         shares.push_back(std::sqrt(image.variance.channels[c].samples[i]) / value);
   if (shares.empty()) return 0.0;
