@@ -26,15 +26,18 @@ enum ExitCode : int {
 using Action = std::function<int()>;
 
 // Each adds one subcommand and sets `chosen` when the user picked it. One file a subcommand.
+void add_accept_command(CLI::App& program, Action& chosen);
 void add_calibrate_command(CLI::App& program, Action& chosen);
 void add_compare_command(CLI::App& program, Action& chosen);
 void add_demo_command(CLI::App& program, Action& chosen);
+void add_export_command(CLI::App& program, Action& chosen);
 void add_fit_command(CLI::App& program, Action& chosen);
 void add_plan_command(CLI::App& program, Action& chosen);
 void add_probe_command(CLI::App& program, Action& chosen);
 void add_render_command(CLI::App& program, Action& chosen);
 void add_report_command(CLI::App& program, Action& chosen);
 void add_solve_command(CLI::App& program, Action& chosen);
+void add_suite_command(CLI::App& program, Action& chosen);
 void add_validate_command(CLI::App& program, Action& chosen);
 
 /// The shipped measurements: $TRUEBOX_REFERENCE, else beside the installed program, else the

@@ -17,11 +17,13 @@ namespace {
 int plan(const std::string& path, const std::string& json_file, std::size_t elements) {
   const Scene scene = read_scene(path);
   const Requirements needs = requirements(scene);
-  const std::size_t bytes = needs.interreflection ? elements * elements * sizeof(double) : 0;
+  const bool has_matrix = needs.interreflection && !needs.path_tracing;
+  const std::size_t bytes = has_matrix ? elements * elements * sizeof(double) : 0;
   std::string text = fmt::format("{}: {} surfaces, {} materials, {} bands\n", path,
                                  scene.surfaces.size(), scene.materials.size(), scene.bands.size());
   for (const auto& reason : needs.reasons) text += "  " + reason + "\n";
-  text += needs.interreflection
+  text += needs.path_tracing ? "  method: path tracing (`truebox render --method path`)\n"
+          : needs.interreflection
               ? fmt::format(
                     "  method: full matrix of form factors, {} elements, {} MiB; three grids, "
                     "constant elements, conjugate gradients\n",
@@ -35,6 +37,7 @@ int plan(const std::string& path, const std::string& json_file, std::size_t elem
                          {"bands_solved", needs.distinct_bands.size()},
                          {"occlusion", needs.occlusion},
                          {"interreflection", needs.interreflection},
+                         {"path_tracing", needs.path_tracing},
                          {"form_factor_bytes", bytes},
                          {"reasons", needs.reasons}};
   write_file_atomically(json_file, json.dump(2) + "\n");

@@ -30,7 +30,10 @@ std::optional<double> share_of(const std::string& text) {
 
 }  // namespace
 
-void add_prediction_options(CLI::App& command, PredictionArguments& a) {
+void add_prediction_options(CLI::App& command, PredictionArguments& a,
+                            const std::vector<std::string>& more_methods) {
+  std::vector<std::string> methods = method_names();
+  methods.insert(methods.begin(), more_methods.begin(), more_methods.end());
   command.add_option("SCENE", a.scene, "scene file (TOML)")->required();
   command.add_option("--elements", a.elements, "elements of the fine grid, about")
       ->capture_default_str()
@@ -40,7 +43,7 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a) {
       ->check(CLI::Range(4, 4096));
   command.add_option("--method", a.method, "how the radiosity system is solved; see truebox sweep")
       ->capture_default_str()
-      ->check(CLI::IsMember(method_names()));
+      ->check(CLI::IsMember(methods));
   command.add_option("--solver-bound", a.relative_bound, "stop at this relative error bound")
       ->capture_default_str()
       ->check(CLI::Range(1e-13, 0.5));
@@ -79,6 +82,8 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
   options.form_factors.rays = a.rays;
   options.solve.method = method_of_name(a.method);
   options.solve.relative_bound = a.relative_bound;
+  options.error_shares = a.error_shares;
+  options.sensitivities = a.sensitivities;
   options.progress = terminal_progress(a.quiet);
   const auto start = std::chrono::steady_clock::now();
   if (a.target_error.empty()) {
@@ -117,6 +122,10 @@ std::string describe(const Predicted& p) {
                    : fmt::format("  the scene is open (no repair); largest row sum {:.6f}\n",
                                  f.row_sum_max);
   text += "  radiosity: " + grid.solve.brief() + "\n";
+  if (const auto& shares = p.prediction->error_shares())
+    text += fmt::format(
+        "  mean error bound: grids {:.2g} %, form factors {:.1g} %, solver {:.1g} %\n",
+        100.0 * shares->discretisation, 100.0 * shares->form_factors, 100.0 * shares->solver);
   for (const TargetStep& step : p.target_steps)
     text += fmt::format("  {} elements: means of surfaces bound to {:.3g} %\n", step.elements,
                         100.0 * step.relative_bound);

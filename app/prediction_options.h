@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "scene/scene.h"
 #include "transport/predict_to_target.h"
@@ -21,11 +22,14 @@ struct PredictionArguments {
   std::string method = "krylov";
   double relative_bound = SolveOptions{}.relative_bound;
   std::string target_error;  ///< "0.5%" or "0.005": chooses elements and solver bound
+  bool error_shares = false, sensitivities = false;  ///< as in PredictOptions
   int threads = 0;
   bool quiet = false;
 };
 
-void add_prediction_options(CLI::App& command, PredictionArguments& arguments);
+/// `more_methods` are those that the command itself knows beside the solvers.
+void add_prediction_options(CLI::App& command, PredictionArguments& arguments,
+                            const std::vector<std::string>& more_methods = {});
 
 /// A scene, its prediction and how long the solve took.
 struct Predicted {

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
+#include <optional>
 
 #include "commands.h"
 #include "image/image_file.h"
@@ -18,7 +19,7 @@ namespace {
 
 struct ProbeArguments {
   PredictionArguments prediction;
-  std::string points, output;
+  std::string points, areas, output;
 };
 
 struct ProbePoint {
@@ -47,40 +48,97 @@ std::vector<ProbePoint> read_points(const std::string& path, double metres_per_u
   return points;
 }
 
+struct ProbeArea {
+  std::string name;
+  int line = 0;
+  Polygon polygon;  // m
+};
+
+// Parallelograms from (ox, oy, oz) along (ux, uy, uz) and (vx, vy, vz); a name counts once.
+std::vector<ProbeArea> read_areas(const std::string& path, double metres_per_unit) {
+  const TableFile table = read_table(path);
+  const std::size_t name = table.column_index("name");
+  std::vector<ProbeArea> areas;
+  for (std::size_t row = 0; row < table.rows.size(); ++row) {
+    const auto vector = [&](const char* x, const char* y, const char* z) -> Vec3 {
+      return metres_per_unit * Vec3(table.number(row, table.column_index(x)),
+                                    table.number(row, table.column_index(y)),
+                                    table.number(row, table.column_index(z)));
+    };
+    const Vec3 o = vector("ox", "oy", "oz"), u = vector("ux", "uy", "uz"),
+               v = vector("vx", "vy", "vz");
+    if (!(u.cross(v).norm() > 1e-12 * u.norm() * v.norm()))
+      throw InputError(path, table.row_lines[row], "an area spanned by u and v",
+                       "parallel vectors");
+    areas.push_back({table.rows[row][name], table.row_lines[row], {o, o + u, o + u + v, o + v}});
+  }
+  return areas;
+}
+
+std::vector<BoundedIrradiance> area_means(const Prediction& prediction, const std::string& path,
+                                          const std::vector<ProbeArea>& areas) {
+  std::vector<std::optional<BoundedIrradiance>> found(areas.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, areas.size(), 1), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      const Polygon& p = areas[i].polygon;
+      found[i] = prediction.mean_irradiance_over(p);
+      if (!found[i]) found[i] = prediction.mean_irradiance_over(Polygon(p.rbegin(), p.rend()));
+    }
+  });
+  std::vector<BoundedIrradiance> means;
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    if (!found[i])
+      throw InputError(path, areas[i].line, "an area on a lit surface of the scene",
+                       '"' + areas[i].name + "\" touches none");
+    means.push_back(std::move(*found[i]));
+  }
+  return means;
+}
+
 int probe(const ProbeArguments& a) {
-  // Points are read first: a mistake there should not cost a solve. Their unit is the scene's.
-  read_points(a.points, 1.0);
+  // Places are read first: a mistake there should not cost a solve. Their unit is the scene's.
+  if (!a.points.empty()) read_points(a.points, 1.0);
+  if (!a.areas.empty()) read_areas(a.areas, 1.0);
   const auto predicted = predict(a.prediction);
   if (predicted->prediction->outcome() != SolveOutcome::converged) {
     fmt::print(stderr, "truebox: the solver did not reach its bound\n");
     return kNotSolved;
   }
-  const auto points = read_points(a.points, predicted->scene.metres_per_unit);
-  std::vector<BoundedIrradiance> answers(points.size());
+  const double unit_m = predicted->scene.metres_per_unit;
+  std::vector<std::string> names;
+  std::vector<BoundedIrradiance> answers;
+  const auto points = a.points.empty() ? std::vector<ProbePoint>{} : read_points(a.points, unit_m);
+  answers.resize(points.size());
+  for (const ProbePoint& point : points) names.push_back(point.name);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 1), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i)
       answers[i] = predicted->prediction->irradiance_at(points[i].position_m, points[i].normal);
   });
+  if (!a.areas.empty()) {
+    const auto areas = read_areas(a.areas, unit_m);
+    for (const ProbeArea& area : areas) names.push_back(area.name);
+    for (BoundedIrradiance& mean : area_means(*predicted->prediction, a.areas, areas))
+      answers.push_back(std::move(mean));
+  }
   const WavelengthGrid& bands = predicted->scene.bands;
   std::string text = "name,band_nm,irradiance,error_bound\n";
   double largest = 0.0;
-  for (std::size_t i = 0; i < points.size(); ++i)
+  for (std::size_t i = 0; i < names.size(); ++i)
     for (std::size_t b = 0; b < bands.size(); ++b) {
       const auto k = static_cast<Eigen::Index>(b);
       const double value = answers[i].value[k], bound = answers[i].error_bound[k];
-      text += fmt::format("\"{}\",{},{:.9g},{:.3g}\n", points[i].name, bands.centre_nm(b), value,
-                          bound);
+      text += fmt::format("\"{}\",{},{:.9g},{:.3g}\n", names[i], bands.centre_nm(b), value, bound);
       if (value > 0.0) largest = std::max(largest, bound / value);
     }
   if (a.output.empty()) {
     fmt::print("{}", text);
     return kAgrees;
   }
-  write_file_atomically(a.output,
-                        "# quantity: irradiance\n# unit: W m^-2 nm^-1\n# source: truebox, " +
-                            predicted->scene.path + "\n" + text);
-  fmt::print("{}{} points, {} bands; largest bound {:.2f} % of its irradiance\n",
-             describe(*predicted), points.size(), bands.size(), 100.0 * largest);
+  write_file_atomically(a.output, std::string("# quantity: irradiance\n# unit: ") +
+                                      predicted->scene.exitance_unit() + "\n# source: truebox, " +
+                                      predicted->scene.path + "\n" + text);
+  fmt::print("{}{} places, {} bands; largest bound {:.2f} % of its irradiance\n",
+             describe(*predicted), names.size(), bands.size(), 100.0 * largest);
   return kAgrees;
 }
 
@@ -90,8 +148,12 @@ void add_probe_command(CLI::App& program, Action& chosen) {
   auto* command = program.add_subcommand("probe", "irradiance at points, with an error bound");
   auto arguments = std::make_shared<ProbeArguments>();
   add_prediction_options(*command, arguments->prediction);
-  command->add_option("--points", arguments->points, "CSV: name,x,y,z,nx,ny,nz in the scene's unit")
-      ->required();
+  auto* places = command->add_option_group("places", "at least one");
+  places->add_option("--points", arguments->points, "CSV: name,x,y,z,nx,ny,nz in the scene's unit");
+  places->add_option(
+      "--areas", arguments->areas,
+      "CSV: name,ox,oy,oz,ux,uy,uz,vx,vy,vz, parallelograms on surfaces: their means");
+  places->require_option(1, 2);
   command->add_option("-o,--output", arguments->output, "CSV: name,band_nm,irradiance,error_bound");
   command->footer(
       "Example: truebox probe reference/cornell_box/cornell_box.toml\n"

@@ -2,14 +2,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <fstream>
-#include <iterator>
 #include <memory>
 
 #include "commands.h"
 #include "document/writers.h"
 #include "image/image_file.h"
-#include "radiometry/input_error.h"
+#include "text_file.h"
 
 namespace truebox::app {
 namespace {
@@ -18,12 +16,6 @@ struct ReportArguments {
   std::string run;
   std::string output = "report.html";
 };
-
-std::string read_text(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path, 0, "a report's JSON", "no such file");
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 /// Success is having written the page; what the verdict says is for `compare` and its like.
 int run_report(const ReportArguments& arguments) {

@@ -4,13 +4,17 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "export/solution_files.h"
 #include "image/image_file.h"
 #include "prediction_options.h"
 #include "radiometry/input_error.h"
+#include "transport/net_flux.h"
+#include "walkthrough/walkthrough.h"
 
 namespace truebox::app {
 namespace {
@@ -20,11 +24,25 @@ struct SolveArguments {
   std::string output, summary;
 };
 
+Observer observer() {
+  return read_observer(
+      std::filesystem::path(reference_directory()) / "colour" / "cie1931_2deg_xyz.csv",
+      "CIE 1931 2 deg");
+}
+
 std::vector<double> values(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
 
 nlohmann::json summary_json(const Predicted& p) {
   const GridSolution& grid = p.prediction->fine();
   const FormFactorSummary& f = grid.form_factors;
+  nlohmann::json attempts = nlohmann::json::array();
+  for (const TargetStep& step : p.target_steps)
+    attempts.push_back({{"elements", step.elements}, {"relative_bound", step.relative_bound}});
+  nlohmann::json shares;
+  if (const auto& found = p.prediction->error_shares())
+    shares = {{"discretisation", found->discretisation},
+              {"form_factors", found->form_factors},
+              {"solver", found->solver}};
   return {{"scene", p.scene.path},
           {"elements", grid.mesh.size()},
           {"elements_coarse", p.prediction->coarse().mesh.size()},
@@ -32,6 +50,10 @@ nlohmann::json summary_json(const Predicted& p) {
           {"bands_solved", p.prediction->needs().distinct_bands.size()},
           {"seconds", p.seconds},
           {"plan", p.prediction->needs().reasons},
+          {"largest_relative_bound_of_a_surface", largest_relative_bound(*p.prediction)},
+          {"error_shares", shares},
+          {"target_attempts", attempts},
+          {"target_missed", p.misses_target},
           {"form_factors",
            {{"pairs_unoccluded", f.pairs_unoccluded},
             {"pairs_hidden", f.pairs_hidden},
@@ -46,13 +68,16 @@ nlohmann::json summary_json(const Predicted& p) {
            {{"outcome", grid.solve.brief()},
             {"iterations", grid.solve.iterations},
             {"matrix_passes", grid.solve.matrix_passes},
+            {"bands_reduced", grid.solve.bands_reduced},
             {"residual_history", grid.solve.residual_history}}}};
 }
 
 nlohmann::json solution_json(const Predicted& p) {
   nlohmann::json json = summary_json(p);
-  json["units"] = {
-      {"radiosity", Radiosity::unit()}, {"irradiance", Irradiance::unit()}, {"area", "m^2"}};
+  json["units"] = {{"radiosity", p.scene.exitance_unit()},
+                   {"irradiance", p.scene.exitance_unit()},
+                   {"net_flux", p.scene.is_total ? "W" : "W nm^-1"},
+                   {"area", "m^2"}};
   json["band_centres_nm"] = p.scene.bands.centres_nm();
   json["surfaces"] = nlohmann::json::array();
   for (const SurfaceMean& mean : surface_means(*p.prediction))
@@ -61,55 +86,20 @@ nlohmann::json solution_json(const Predicted& p) {
                                 {"radiosity", values(mean.radiosity)},
                                 {"radiosity_error_bound", values(mean.radiosity_bound)},
                                 {"irradiance", values(mean.irradiance)}});
-  return json;
-}
-
-template <class Write>
-std::string data_array(const char* type, const char* name, int components, const Write& write) {
-  std::string text = fmt::format(
-      "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"ascii\">\n", type,
-      name, components);
-  write(text);
-  return text + "</DataArray>\n";
-}
-
-// VTK XML unstructured grid, one polygon an element, cell data one component a band (ParaView).
-std::string solution_vtu(const Predicted& p) {
-  const PatchMesh& mesh = p.prediction->fine().mesh;
-  std::string text = fmt::format(
-      "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" "
-      "byte_order=\"LittleEndian\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" "
-      "NumberOfCells=\"{}\">\n<Points>\n",
-      mesh.vertices.size(), mesh.size());
-  text += data_array("Float64", "Points", 3, [&](std::string& out) {
-    for (const Vec3& v : mesh.vertices) out += fmt::format("{} {} {}\n", v.x(), v.y(), v.z());
-  });
-  text += "</Points>\n<Cells>\n";
-  text += data_array("Int32", "connectivity", 1, [&](std::string& out) {
-    for (std::uint32_t c : mesh.corners) out += fmt::format("{} ", c);
-  });
-  text += data_array("Int32", "offsets", 1, [&](std::string& out) {
-    for (const Patch& patch : mesh.patches)
-      out += fmt::format("{} ", patch.first_corner + patch.corner_count);
-  });
-  text += data_array("UInt8", "types", 1, [&](std::string& out) {
-    for (std::size_t i = 0; i < mesh.size(); ++i) out += "7 ";  // VTK_POLYGON
-  });
-  text += "</Cells>\n<CellData>\n";
-  const auto matrix = [&](const char* name, const BandMatrix& m) {
-    text += data_array("Float32", name, static_cast<int>(m.cols()), [&](std::string& out) {
-      for (Eigen::Index i = 0; i < m.rows(); ++i) {
-        for (Eigen::Index b = 0; b < m.cols(); ++b) out += fmt::format("{:.7g} ", m(i, b));
-        out += '\n';
+  for (const SurfaceFlux& flux : net_fluxes(*p.prediction))
+    for (auto& surface : json["surfaces"])
+      if (surface["name"] == flux.surface) {
+        surface["net_flux"] = values(flux.net_W);
+        surface["net_flux_error_bound"] = values(flux.bound_W);
       }
-    });
-  };
-  matrix("radiosity_W_m-2_nm-1", p.prediction->radiosity());
-  matrix("radiosity_error_bound_W_m-2_nm-1", p.prediction->radiosity_bound());
-  text += data_array("Int32", "surface", 1, [&](std::string& out) {
-    for (const Patch& patch : mesh.patches) out += fmt::format("{} ", mesh.surface_of(patch));
-  });
-  return text + "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
+  const auto derivatives = p.prediction->radiosity_by_reflectance();
+  for (std::size_t m = 0; m < derivatives.size(); ++m)
+    for (auto& surface : json["surfaces"])
+      for (std::size_t s = 0; s < p.scene.surfaces.size(); ++s)
+        if (surface["name"] == p.scene.surfaces[s].name)
+          surface["radiosity_by_reflectance"][p.scene.materials[m].name] =
+              values(derivatives[m].row(static_cast<Eigen::Index>(s)).transpose());
+  return json;
 }
 
 void print_surfaces(const Predicted& p) {
@@ -118,8 +108,12 @@ void print_surfaces(const Predicted& p) {
       bands < 3 ? std::vector<std::size_t>{0}
                 : std::vector<std::size_t>{bands / 4, bands / 2, 3 * bands / 4};
   fmt::print("{:<20}", "mean radiosity of");
-  for (std::size_t b : shown) fmt::print("{:>14.0f} nm{:>10}", p.scene.bands.centre_nm(b), "bound");
-  fmt::print("   ({})\n", Radiosity::unit());
+  for (std::size_t b : shown)
+    fmt::print(
+        "{:>17}{:>10}",
+        p.scene.is_total ? "all wavelengths" : fmt::format("{:.0f} nm", p.scene.bands.centre_nm(b)),
+        "bound");
+  fmt::print("   ({})\n", p.scene.exitance_unit());
   for (const SurfaceMean& mean : surface_means(*p.prediction)) {
     fmt::print("{:<20}", mean.surface);
     for (std::size_t b : shown) {
@@ -132,10 +126,38 @@ void print_surfaces(const Predicted& p) {
   }
 }
 
+// Heat that a surface gives or takes, over all bands.
+void print_heat(const Predicted& p) {
+  fmt::print("{:<20}{:>17}{:>14}   (W)\n", "net heat from", "flux", "bound");
+  for (const SurfaceFlux& flux : net_fluxes(*p.prediction)) {
+    double net_W = 0.0, bound_W = 0.0;
+    for (std::size_t b = 0; b < p.scene.bands.size(); ++b) {
+      const double width = p.scene.is_total ? 1.0 : p.scene.bands.width_nm(b);
+      net_W += width * flux.net_W[static_cast<Eigen::Index>(b)];
+      bound_W += width * flux.bound_W[static_cast<Eigen::Index>(b)];
+    }
+    fmt::print("{:<20}{:>17.6g}{:>14.2g}\n", flux.surface, net_W, bound_W);
+  }
+}
+
+// What -o can be, by its ending.
+const std::map<std::string, std::string (*)(const Predicted&)>& writers() {
+  static const std::map<std::string, std::string (*)(const Predicted&)> kWriters = {
+      {".json", [](const Predicted& p) { return solution_json(p).dump(1) + "\n"; }},
+      {".vtu", [](const Predicted& p) { return solution_vtu(*p.prediction); }},
+      {".glb", [](const Predicted& p) { return solution_glb(*p.prediction, observer()); }},
+      {".html", [](const Predicted& p) {
+         return walkthrough_html(*p.prediction, observer(),
+                                 std::filesystem::path(p.scene.path).filename().string());
+       }}};
+  return kWriters;
+}
+
 int solve(const SolveArguments& a) {
-  const auto extension = std::filesystem::path(a.output).extension();
-  if (!a.output.empty() && extension != ".json" && extension != ".vtu")
-    throw InputError(a.output, 0, "an output ending in .json or .vtu", extension.string());
+  const auto writer = writers().find(std::filesystem::path(a.output).extension().string());
+  if (!a.output.empty() && writer == writers().end())
+    throw InputError(a.output, 0, "an output ending in .json, .vtu, .glb or .html",
+                     std::filesystem::path(a.output).extension().string());
   const auto predicted = predict(a.prediction);
   fmt::print("{}", describe(*predicted));
   if (predicted->prediction->outcome() != SolveOutcome::converged) {
@@ -144,9 +166,8 @@ int solve(const SolveArguments& a) {
     return kNotSolved;
   }
   print_surfaces(*predicted);
-  if (extension == ".json")
-    write_file_atomically(a.output, solution_json(*predicted).dump(1) + "\n");
-  if (extension == ".vtu") write_file_atomically(a.output, solution_vtu(*predicted));
+  if (predicted->scene.is_thermal) print_heat(*predicted);
+  if (!a.output.empty()) write_file_atomically(a.output, writer->second(*predicted));
   if (!a.summary.empty()) write_file_atomically(a.summary, summary_json(*predicted).dump(1) + "\n");
   return predicted->misses_target ? kNotSolved : kAgrees;
 }
@@ -157,8 +178,13 @@ void add_solve_command(CLI::App& program, Action& chosen) {
   auto* command = program.add_subcommand("solve", "radiosity in every band, with an error bound");
   auto arguments = std::make_shared<SolveArguments>();
   add_prediction_options(*command, arguments->prediction);
+  arguments->prediction.error_shares = true;
+  command->add_flag("--sensitivities", arguments->prediction.sensitivities,
+                    "derivatives of every surface's radiosity by every material's reflectance, "
+                    "into the .json");
   command->add_option("-o,--output", arguments->output,
-                      "means of the surfaces (.json) or all elements (.vtu, ParaView)");
+                      "means of the surfaces (.json) or all elements (.vtu for ParaView, .glb, "
+                      ".html to walk through)");
   command->add_option("--summary", arguments->summary, "how the solve went, as JSON");
   command->footer("Example: truebox solve reference/cornell_box/cornell_box.toml -o box.vtu");
   command->callback([=, &chosen] { chosen = [=] { return solve(*arguments); }; });

@@ -20,14 +20,15 @@ struct Subject {
   const char* name;
   Sweep (*run)(const Scene& scene, const SweepArguments& arguments);
 };
-constexpr Subject kSubjects[] = {{"viewfactors", sweep_view_factors}};
+constexpr Subject kSubjects[] = {{"viewfactors", sweep_view_factors},
+                                 {"radiosity", sweep_radiosity}};
 
 void print(const Sweep& sweep) {
-  fmt::print("{}\nerror: {}\nagainst: {}\n{:<18}{:<22}{:>12}{:>12}{:>12}\n", sweep.title,
+  fmt::print("{}\nerror: {}\nagainst: {}\n{:<22}{:<22}{:>12}{:>12}{:>12}\n", sweep.title,
              sweep.error_name, sweep.reference, "method", "setting", "time / s", "error",
              "bound held");
   for (const SweepPoint& p : sweep.points)
-    fmt::print("{:<18}{:<22}{:>12.3g}{:>12.2e}{:>10.1f} %{}\n", p.method, p.setting, p.cpu_s,
+    fmt::print("{:<22}{:<22}{:>12.3g}{:>12.2e}{:>10.1f} %{}\n", p.method, p.setting, p.cpu_s,
                p.error, 100.0 * p.bound_held, p.on_front ? "  front" : "");
 }
 

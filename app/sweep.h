@@ -11,7 +11,7 @@ namespace truebox::app {
 /// One method at one setting: what it cost and how wrong it was.
 struct SweepPoint {
   std::string method, setting;
-  double cpu_s = 0.0;       ///< of this thread
+  double cpu_s = 0.0;       ///< one thread
   double error = 0.0;       ///< against the sweep's reference
   double bound_held = 1.0;  ///< share of the answers whose error was within their stated bound
   bool on_front = false;    ///< no other point is both faster and better
@@ -37,5 +37,6 @@ void mark_front(std::vector<SweepPoint>& points);
 
 /// One function a subject; sweep.cpp lists them.
 Sweep sweep_view_factors(const Scene& scene, const SweepArguments& arguments);
+Sweep sweep_radiosity(const Scene& scene, const SweepArguments& arguments);
 
 }  // namespace truebox::app

@@ -16,7 +16,7 @@ namespace truebox::app {
 namespace {
 
 struct ValidateArguments {
-  std::string only, json, junit;
+  std::string only, json, junit, p_values;
   std::size_t elements = 6000;
   bool details = false;
 };
@@ -64,9 +64,12 @@ void print(const std::vector<AccuracyCheck>& checks, bool details) {
 
 int validate(const ValidateArguments& a) {
   const auto progress = terminal_progress();
-  const auto checks = run_validation(reference_directory(), a.only, a.elements, progress);
+  Image p_values;
+  const auto checks =
+      run_validation(reference_directory(), a.only, a.elements, progress, &p_values);
   if (progress) progress("", 1.0);
   print(checks, a.details);
+  if (!a.p_values.empty()) write_exr(a.p_values, p_values);
   if (!a.json.empty()) write_file_atomically(a.json, as_json(checks).dump(1) + "\n");
   if (!a.junit.empty()) {
     Report report;
@@ -86,12 +89,18 @@ void add_validate_command(CLI::App& program, Action& chosen) {
   auto* command = program.add_subcommand(
       "validate", "the program against closed forms and certified values, in digits");
   auto arguments = std::make_shared<ValidateArguments>();
-  command->add_option("--only", arguments->only, "one group")
-      ->check(CLI::IsMember({"viewfactors", "furnace", "plates", "cube", "cie171", "cornellbox"}));
+  auto* only =
+      command->add_option("--only", arguments->only, "one group; render runs only when named")
+          ->check(CLI::IsMember(
+              {"viewfactors", "furnace", "plates", "bases", "cube", "cie171", "cornellbox", kRender}));
   command->add_option("--elements", arguments->elements, "elements of the Cornell Box")
       ->capture_default_str();
   command->add_option("--json", arguments->json, "every check as JSON");
   command->add_option("--junit", arguments->junit, "every check as JUnit XML");
+  command
+      ->add_option("--p-values", arguments->p_values,
+                   "OpenEXR of the p-value of each pixel and band, with --only render")
+      ->needs(only);
   command->add_flag("--details", arguments->details, "print every check, not only failures");
   command->footer("Example: truebox validate --only viewfactors --details");
   command->callback([=, &chosen] { chosen = [=] { return validate(*arguments); }; });

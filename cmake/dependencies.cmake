@@ -12,6 +12,17 @@ find_package(tomlplusplus CONFIG REQUIRED)
 find_package(fmt CONFIG REQUIRED)
 find_package(nlohmann_json CONFIG REQUIRED)
 find_package(Ceres CONFIG REQUIRED)
+find_package(Boost REQUIRED)
+# OpenCV's CMake config comes with all of OpenCV; its image filters alone are one small package.
+find_path(TRUEBOX_OPENCV_INCLUDE opencv2/imgproc.hpp PATH_SUFFIXES opencv4 REQUIRED)
+find_library(TRUEBOX_OPENCV_IMGPROC opencv_imgproc REQUIRED)
+find_library(TRUEBOX_OPENCV_CORE opencv_core REQUIRED)
+if(NOT TARGET opencv_imgproc)
+  add_library(opencv_imgproc INTERFACE IMPORTED)
+  target_include_directories(opencv_imgproc SYSTEM INTERFACE ${TRUEBOX_OPENCV_INCLUDE})
+  target_link_libraries(opencv_imgproc INTERFACE
+    ${TRUEBOX_OPENCV_IMGPROC} ${TRUEBOX_OPENCV_CORE})
+endif()
 # Debian puts this config into /usr/share/cmake itself, where find_package does not look.
 find_package(OpenColorIO CONFIG REQUIRED PATHS /usr/share/cmake NO_DEFAULT_PATH)
 # Debian's OpenColorIO 2.1.2 config was moved without its prefix and names the folder "/include",

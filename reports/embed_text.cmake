@@ -1,12 +1,12 @@
-# embed_text(<out.cpp> <variable> <files>...): text files, one after the other, as
-# `truebox::embedded::<variable>`, so that the program finds them in the build tree, in the install
-# tree and anywhere else alike.
+# embed_text(<out.cpp> <variable> <files>...): text files (of this folder, or full paths), one after
+# the other, as `truebox::embedded::<variable>`, so that the program finds them in the build tree, in
+# the install tree and anywhere else alike.
 function(embed_text output variable)
   set(text "")
   foreach(file IN LISTS ARGN)
-    set_property(DIRECTORY APPEND PROPERTY
-      CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${file})
-    file(READ ${CMAKE_CURRENT_SOURCE_DIR}/${file} part)
+    cmake_path(ABSOLUTE_PATH file)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+    file(READ ${file} part)
     string(APPEND text "${part}")
   endforeach()
   file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${output} @ONLY CONTENT

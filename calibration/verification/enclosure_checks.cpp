@@ -2,23 +2,14 @@
 #include <cmath>
 
 #include "provenance/provenance.h"
-#include "radiometry/input_error.h"
 #include "radiometry/table_file.h"
 #include "transport/solve_radiosity.h"
 #include "verification/accuracy_check.h"
 #include "verification/box_scene.h"
+#include "verification/table_parameter.h"
 
 namespace truebox {
 namespace {
-
-// The number behind "key=" in a parameter text such as "rho=0.5;E=1".
-double parameter(const TableFile& table, std::size_t row, const std::string& key) {
-  const std::string& text = table.rows[row][1];
-  const std::size_t at = text.find(key + "=");
-  if (at == std::string::npos)
-    throw InputError(table.path, table.row_lines[row], key + "=...", text);
-  return std::strtod(text.c_str() + at + key.size() + 1, nullptr);
-}
 
 FormFactors exact_factors(const PatchMesh& mesh, const Scene& scene) {
   FormFactorOptions options;
@@ -48,7 +39,7 @@ std::vector<AccuracyCheck> check_furnace(const std::filesystem::path& reference_
   std::vector<AccuracyCheck> checks;
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
     if (table.rows[row][0] != "furnace_any_closed") continue;
-    const double rho = parameter(table, row, "rho");
+    const double rho = table_parameter(table, row, "rho");
     for (const auto& [method, name] : {std::pair{SolveMethod::conjugate_gradient, "Krylov"},
                                        std::pair{SolveMethod::gauss_seidel, "Gauss-Seidel"}}) {
       if (method == SolveMethod::gauss_seidel && rho > 0.9999) continue;  // 1e7 sweeps
@@ -83,8 +74,8 @@ std::vector<AccuracyCheck> check_infinite_plates(const std::filesystem::path& re
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
     if (table.rows[row][0] != "infinite_plates") continue;
     BandMatrix rho(2, 1), source(2, 1), b;
-    rho << parameter(table, row, "rho1"), parameter(table, row, "rho2");
-    source << parameter(table, row, "E1"), parameter(table, row, "E2");
+    rho << table_parameter(table, row, "rho1"), table_parameter(table, row, "rho2");
+    source << table_parameter(table, row, "E1"), table_parameter(table, row, "E2");
     solve_radiosity(factors, rho, source, tight(SolveMethod::conjugate_gradient, rho.maxCoeff()),
                     b);
     AccuracyCheck check{"plates", table.rows[row][1] + ", " + table.rows[row][2],
@@ -115,7 +106,7 @@ std::vector<AccuracyCheck> check_ceiling_lit_cube(const std::filesystem::path& r
       if (table.rows[row][0] != "cube_ceiling_light_discrete" ||
           table.rows[row][1].find(mark) == std::string::npos)
         continue;
-      const double rho = parameter(table, row, "rho");
+      const double rho = table_parameter(table, row, "rho");
       BandMatrix source = BandMatrix::Zero(n, 1), b;
       for (Eigen::Index i = 0; i < n; ++i)
         if (mesh.surface_of(mesh.patches[i]) == kBoxCeiling) source(i, 0) = 1.0;

@@ -3,6 +3,7 @@
 
 #include <OpenColorIO/OpenColorIO.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -60,12 +61,31 @@ struct ColourPipeline::State {
   std::string description;
 };
 
-ColourPipeline::ColourPipeline() : state_(std::make_unique<State>()) {
+namespace {
+
+/// The default, or the name asked for if the config has it.
+std::string chosen(const std::string& config, const char* what, const std::string& name,
+                   const std::string& fallback, const std::vector<std::string>& known) {
+  if (name.empty()) return fallback;
+  if (std::find(known.begin(), known.end(), name) != known.end()) return name;
+  throw InputError(config, 0, fmt::format("one of the {}s {}", what, fmt::join(known, ", ")),
+                   fmt::format("\"{}\"", name));
+}
+
+}  // namespace
+
+ColourPipeline::ColourPipeline(const ViewChoice& choice) : state_(std::make_unique<State>()) {
   std::string name;
   const auto config = load_config(name);
   const std::string source = source_space(*config);
-  const std::string display = config->getDefaultDisplay();
-  const std::string view = config->getDefaultView(display.c_str());
+  std::vector<std::string> displays, views;
+  for (int i = 0; i < config->getNumDisplays(); ++i) displays.push_back(config->getDisplay(i));
+  const std::string display =
+      chosen(name, "display", choice.display, config->getDefaultDisplay(), displays);
+  for (int i = 0; i < config->getNumViews(display.c_str()); ++i)
+    views.push_back(config->getView(display.c_str(), i));
+  const std::string view =
+      chosen(name, "view", choice.view, config->getDefaultView(display.c_str()), views);
   try {
     state_->processor = config
                             ->getProcessor(source.c_str(), display.c_str(), view.c_str(),
@@ -91,6 +111,7 @@ void quantise(const float* display, bool finite, std::size_t pixel, DisplayPictu
   std::uint8_t* out = &picture.rgb[3 * pixel];
   if (!finite) {
     ++picture.not_finite_pixels;
+    picture.flags[pixel] = kNotFinite;
     std::copy_n(kNotFiniteColour, 3, out);
     return;
   }
@@ -100,6 +121,8 @@ void quantise(const float* display, bool finite, std::size_t pixel, DisplayPictu
     out_of_gamut = out_of_gamut || display[c] < -kClampTolerance;
     out[c] = static_cast<std::uint8_t>(std::lround(std::clamp(display[c], 0.0f, 1.0f) * 255.0f));
   }
+  picture.flags[pixel] =
+      static_cast<std::uint8_t>((clipped ? kClipped : 0) | (out_of_gamut ? kOutOfGamut : 0));
   picture.clipped_pixels += clipped;
   picture.out_of_gamut_pixels += out_of_gamut;
 }
@@ -115,6 +138,7 @@ DisplayPicture convert(const ocio::CPUProcessor& processor, const std::string& d
   picture.height = height;
   picture.exposure = exposure;
   picture.rgb.resize(3 * pixels);
+  picture.flags.resize(pixels);
   for (std::size_t i = 0; i < pixels; ++i) {
     float value[3];
     bool finite = true;
@@ -163,6 +187,19 @@ DisplayPicture ColourPipeline::grey_picture(int width, int height, std::span<con
     throw std::invalid_argument("the plane has other than width x height samples");
   const std::span<const float> planes[3] = {plane, plane, plane};
   return convert(*state_->processor, state_->description, width, height, planes, exposure);
+}
+
+std::vector<std::uint8_t> flagged_picture(const DisplayPicture& picture) {
+  constexpr std::uint8_t kColours[5][3] = {
+      {0, 0, 0}, {230, 60, 40}, {60, 110, 230}, {150, 60, 200}, {255, 0, 255}};
+  std::vector<std::uint8_t> rgb(picture.rgb.size());
+  for (std::size_t i = 0; i < picture.flags.size(); ++i) {
+    const std::uint8_t* from = &picture.rgb[3 * i];
+    const auto grey = static_cast<std::uint8_t>((from[0] + 2 * from[1] + from[2]) / 8);
+    for (std::size_t c = 0; c < 3; ++c)
+      rgb[3 * i + c] = picture.flags[i] == 0 ? grey : kColours[picture.flags[i]][c];
+  }
+  return rgb;
 }
 
 double exposure_for_quantile(std::span<const float> values, double quantile) {

@@ -11,6 +11,15 @@
 
 namespace truebox {
 
+/// Why a pixel is not shown as it is.
+enum ColourFlag : std::uint8_t { kClipped = 1, kOutOfGamut = 2, kNotFinite = 4 };
+
+/// Names of an OpenColorIO config; empty: its default.
+struct ViewChoice {
+  std::string display{};
+  std::string view{};
+};
+
 /// A picture for a display, 8 bit, and what its making has cost.
 struct DisplayPicture {
   int width = 0;
@@ -19,6 +28,7 @@ struct DisplayPicture {
   std::size_t clipped_pixels = 0;       ///< brighter than the display's white in R, G or B
   std::size_t out_of_gamut_pixels = 0;  ///< negative in R, G or B: the display has no such colour
   std::size_t not_finite_pixels = 0;    ///< NaN or Inf, drawn magenta
+  std::vector<std::uint8_t> flags;      ///< of each pixel: any of the ColourFlag
   double exposure = 1.0;
   std::string description;  ///< config, spaces, display, view, white, exposure and the counts above
   std::string note;         ///< the exposure and what was clipped, short enough for a caption
@@ -30,8 +40,9 @@ struct DisplayPicture {
 /// Values are clamped to the display only here, at the last step, and the clamped are counted.
 class ColourPipeline {
  public:
-  /// Throws InputError if $OCIO names a config that cannot be used.
-  ColourPipeline();
+  /// Throws InputError if $OCIO names a config that cannot be used, or one without the display or
+  /// view asked for.
+  explicit ColourPipeline(const ViewChoice& choice = {});
   ~ColourPipeline();
   ColourPipeline(ColourPipeline&&) noexcept;
   ColourPipeline& operator=(ColourPipeline&&) noexcept;
@@ -51,6 +62,10 @@ class ColourPipeline {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// The same picture darkened to grey, its flagged pixels in colour: red clipped, blue out of gamut,
+/// violet both, magenta not finite.
+std::vector<std::uint8_t> flagged_picture(const DisplayPicture& picture);
 
 /// The exposure that shows the given quantile of the finite, positive values as display white; 1 if
 /// there are none. For pictures of the same thing use one exposure, chosen from the reference.

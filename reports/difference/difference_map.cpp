@@ -3,11 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <stdexcept>
 
 #include "image/spectral_image.h"
 #include "radiometry/input_error.h"
+#include "uncertainty/distributions.h"
 
 namespace truebox {
 namespace {
@@ -117,9 +121,73 @@ const Channel& uncertainty_channel(const Image& uncertainty, const Pair& pair,
                                   pair.reference->name, names_text(uncertainty)));
 }
 
-void add_in_quadrature(std::vector<float>& u, const Channel& other) {
-  if (u.empty()) u.assign(other.samples.size(), 0.0f);
-  for (std::size_t i = 0; i < u.size(); ++i) u[i] = std::hypot(u[i], other.samples[i]);
+/// Variance of one side, and how many samples it was estimated from (0: very many).
+struct Side {
+  const Image* uncertainty;
+  double samples;
+};
+
+void require_valid(const DifferenceOptions& options) {
+  for (double n : {options.test_samples, options.reference_samples})
+    if (n != 0.0 && !(n >= 2.0)) throw std::invalid_argument("a variance needs at least 2 samples");
+  if (!(options.calibration_relative >= 0.0 && std::isfinite(options.calibration_relative)))
+    throw std::invalid_argument("the calibration's uncertainty must not be negative");
+}
+
+/// Fills u and its degrees of freedom, nu = u^4 / sum(u_i^4 / nu_i).
+void add_uncertainty(DifferenceChannel& channel, const Pair& pair,
+                     const DifferenceOptions& options) {
+  const Side sides[] = {{options.test_uncertainty, options.test_samples},
+                        {options.reference_uncertainty, options.reference_samples}};
+  const std::size_t n = channel.difference.size();
+  std::vector<double> variance(n, 0.0), fourth(n, 0.0);
+  bool stated = false, few = false;
+  const auto add = [&](std::size_t i, double u, double samples) {
+    // A negative u is no u: NaN, which never passes.
+    variance[i] += u >= 0.0 ? u * u : std::numeric_limits<double>::quiet_NaN();
+    if (samples > 0.0) fourth[i] += u * u * u * u / (samples - 1.0);
+  };
+  for (const Side& side : sides) {
+    if (side.uncertainty == nullptr) continue;
+    stated = true;
+    few = few || side.samples > 0.0;
+    const Channel& u = uncertainty_channel(*side.uncertainty, pair, options);
+    for (std::size_t i = 0; i < n; ++i) add(i, u.samples[i], side.samples);
+  }
+  if (options.test_error_bound != nullptr) {
+    stated = true;
+    channel.bound_uncertainty =
+        uncertainty_channel(*options.test_error_bound, pair, options).samples;
+    for (float& u : channel.bound_uncertainty) u /= std::numbers::sqrt3_v<float>;
+    for (std::size_t i = 0; i < n; ++i) add(i, channel.bound_uncertainty[i], 0.0);
+  }
+  if (options.calibration_relative > 0.0) {
+    stated = true;
+    for (std::size_t i = 0; i < n; ++i)
+      add(i, options.calibration_relative * std::abs(channel.reference[i]), 0.0);
+  }
+  if (!stated) return;
+  channel.standard_uncertainty.resize(n);
+  for (std::size_t i = 0; i < n; ++i)
+    channel.standard_uncertainty[i] = static_cast<float>(std::sqrt(variance[i]));
+  if (!few) return;
+  channel.degrees_of_freedom.resize(n);
+  for (std::size_t i = 0; i < n; ++i)
+    channel.degrees_of_freedom[i] = fourth[i] > 0.0
+                                        ? static_cast<float>(variance[i] * variance[i] / fourth[i])
+                                        : std::numeric_limits<float>::infinity();
+}
+
+std::vector<std::uint8_t> pixel_mask(const Image& mask, const Image& reference) {
+  require_equal_size(mask, reference, "the mask");
+  if (mask.channels.size() != 1)
+    throw MismatchError(fmt::format("a mask has one channel, this one has {}", names_text(mask)));
+  std::vector<std::uint8_t> counts(mask.channels[0].samples.size());
+  std::transform(mask.channels[0].samples.begin(), mask.channels[0].samples.end(), counts.begin(),
+                 [](float v) { return static_cast<std::uint8_t>(v != 0.0f); });
+  if (std::find(counts.begin(), counts.end(), 1) == counts.end())
+    throw MismatchError("the mask leaves no pixel to compare");
+  return counts;
 }
 
 }  // namespace
@@ -129,6 +197,19 @@ double DifferenceChannel::sigmas(std::size_t pixel) const {
   if (!(u >= 0.0)) return std::numeric_limits<double>::quiet_NaN();  // a negative u is no u
   if (u == 0.0) return d == 0.0 ? 0.0 : std::copysign(std::numeric_limits<double>::infinity(), d);
   return d / u;
+}
+
+double DifferenceChannel::score(std::size_t pixel) const {
+  const double t = sigmas(pixel);
+  if (degrees_of_freedom.empty() || std::isnan(t)) return t;
+  // Satterthwaite's estimate is at least the smaller of the two sides' degrees, which is >= 1.
+  return normal_score_of_student_t(t, std::max(1.0, double{degrees_of_freedom[pixel]}));
+}
+
+std::size_t DifferenceMap::pixel_count() const {
+  if (mask.empty()) return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  return static_cast<std::size_t>(mask.size()) -
+         static_cast<std::size_t>(std::count(mask.begin(), mask.end(), 0));
 }
 
 bool DifferenceMap::has_uncertainty() const {
@@ -141,20 +222,27 @@ DifferenceMap difference_map(const Image& test, const Image& reference,
                              const DifferenceOptions& options) {
   require_equal_size(test, reference, "the test");
   require_equal_unit(test, reference);
-  DifferenceMap map{reference.width, reference.height, "", {}};
+  require_valid(options);
+  for (const auto& [image, what] : {std::pair{options.test_uncertainty, "the uncertainty"},
+                                    std::pair{options.reference_uncertainty, "the uncertainty"},
+                                    std::pair{options.test_error_bound, "the error bound"}})
+    if (image != nullptr) require_equal_size(*image, reference, what);
+  DifferenceMap map;
+  map.width = reference.width;
+  map.height = reference.height;
+  map.calibration_relative = options.calibration_relative;
+  if (options.mask != nullptr) map.mask = pixel_mask(*options.mask, reference);
   if (const auto unit = reference.attributes.find("unit"); unit != reference.attributes.end())
     map.unit = unit->second;
   for (const Pair& pair : match(test, reference, options)) {
-    DifferenceChannel channel{pair.reference->name, pair.wavelength_nm, {}, {}, {}};
+    DifferenceChannel channel;
+    channel.name = pair.reference->name;
+    channel.wavelength_nm = pair.wavelength_nm;
     channel.reference = pair.reference->samples;
     channel.difference.resize(channel.reference.size());
     for (std::size_t i = 0; i < channel.difference.size(); ++i)
       channel.difference[i] = pair.test->samples[i] - channel.reference[i];
-    for (const Image* u : {options.test_uncertainty, options.reference_uncertainty}) {
-      if (u == nullptr) continue;
-      require_equal_size(*u, reference, "the uncertainty");
-      add_in_quadrature(channel.standard_uncertainty, uncertainty_channel(*u, pair, options));
-    }
+    add_uncertainty(channel, pair, options);
     map.channels.push_back(std::move(channel));
   }
   return map;

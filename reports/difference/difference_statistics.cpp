@@ -16,25 +16,16 @@ SamplePosition position(const DifferenceMap& map, std::size_t pixel, const std::
   return {static_cast<int>(pixel % width), static_cast<int>(pixel / width), channel};
 }
 
-/// Nearest rank: the smallest magnitude that at least the given fraction does not exceed.
-double percentile(std::vector<float>& magnitudes, double fraction) {
-  if (magnitudes.empty()) return kNaN;
-  const double n = static_cast<double>(magnitudes.size());
-  const auto rank = static_cast<std::size_t>(std::max(1.0, std::ceil(fraction * n))) - 1;
-  const auto at = magnitudes.begin() + static_cast<std::ptrdiff_t>(rank);
-  std::nth_element(magnitudes.begin(), at, magnitudes.end());
-  return *at;
-}
-
 bool is_finite(const DifferenceChannel& channel, std::size_t pixel) {
   return std::isfinite(channel.difference[pixel]) && std::isfinite(channel.reference[pixel]);
 }
 
 double on_scale(const DifferenceChannel& channel, std::size_t pixel, DifferenceScale scale) {
   const double d = std::abs(static_cast<double>(channel.difference[pixel]));
-  if (scale == DifferenceScale::sigmas) return std::abs(channel.sigmas(pixel));
+  if (scale == DifferenceScale::sigmas) return std::abs(channel.score(pixel));
   if (scale == DifferenceScale::absolute || d == 0.0) return d;
-  return d / std::abs(static_cast<double>(channel.reference[pixel]));
+  const double ratio = d / std::abs(static_cast<double>(channel.reference[pixel]));
+  return scale == DifferenceScale::percent ? 100.0 * ratio : ratio;
 }
 
 void require_valid(const DifferenceMap& map, const DifferenceLimits& limits) {
@@ -48,13 +39,31 @@ void require_valid(const DifferenceMap& map, const DifferenceLimits& limits) {
 
 }  // namespace
 
-DifferenceStatistics difference_statistics(const DifferenceMap& map) {
+namespace {
+
+/// Mean |reference|, over what `difference_statistics` counts.
+double mean_reference(const DifferenceMap& map, std::size_t from, std::size_t to) {
+  double sum = 0.0, n = 0.0;
+  for (std::size_t c = from; c < to; ++c)
+    for (std::size_t i = 0; i < map.channels[c].difference.size(); ++i) {
+      if (!map.counts(i) || !is_finite(map.channels[c], i)) continue;
+      sum += std::abs(static_cast<double>(map.channels[c].reference[i]));
+      n += 1.0;
+    }
+  return sum / n;
+}
+
+DifferenceStatistics statistics_of(const DifferenceMap& map, std::size_t from, std::size_t to) {
   DifferenceStatistics s;
   double sum = 0, sum_abs = 0, sum_square = 0, reference_abs = 0, reference_square = 0, sum_z2 = 0;
+  double relative_square = 0, symmetric = 0, peak = 0;
   const bool with_sigmas = map.has_uncertainty();
+  const double mean = mean_reference(map, from, to), epsilon = 0.01 * mean * mean;
   std::vector<float> magnitudes;
-  for (const auto& channel : map.channels) {
+  for (std::size_t c = from; c < to; ++c) {
+    const DifferenceChannel& channel = map.channels[c];
     for (std::size_t i = 0; i < channel.difference.size(); ++i) {
+      if (!map.counts(i)) continue;
       ++s.samples;
       if (!is_finite(channel, i)) {
         ++s.not_finite;
@@ -66,6 +75,11 @@ DifferenceStatistics difference_statistics(const DifferenceMap& map) {
       sum_square += d * d;
       reference_abs += std::abs(r);
       reference_square += r * r;
+      peak = std::max(peak, std::abs(r));
+      if (d != 0.0) {
+        relative_square += d * d / (r * r + epsilon);
+        symmetric += 2.0 * std::abs(d) / (std::abs(r + d) + std::abs(r));
+      }
       if (with_sigmas) sum_z2 += channel.sigmas(i) * channel.sigmas(i);
       if (magnitudes.empty() || std::abs(d) > s.max_absolute) {
         s.max_absolute = std::abs(d);
@@ -82,20 +96,45 @@ DifferenceStatistics difference_statistics(const DifferenceMap& map) {
   s.relative_bias = reference_abs > 0.0 ? sum / reference_abs : kNaN;
   s.relative_mean_absolute = reference_abs > 0.0 ? sum_abs / reference_abs : kNaN;
   s.relative_rms = reference_square > 0.0 ? std::sqrt(sum_square / reference_square) : kNaN;
+  s.relative_mse = reference_abs > 0.0 ? relative_square / n : kNaN;
+  s.smape = symmetric / n;
+  s.psnr_db = peak > 0.0 ? 20.0 * std::log10(peak / s.rms) : kNaN;
   s.rms_sigmas = with_sigmas ? std::sqrt(sum_z2 / n) : kNaN;
   if (magnitudes.empty()) s.max_absolute = kNaN;
-  s.p50 = percentile(magnitudes, 0.50);
-  s.p95 = percentile(magnitudes, 0.95);
-  s.p99 = percentile(magnitudes, 0.99);
+  s.p50 = nearest_rank(magnitudes, 0.50);
+  s.p95 = nearest_rank(magnitudes, 0.95);
+  s.p99 = nearest_rank(magnitudes, 0.99);
   return s;
+}
+
+}  // namespace
+
+double nearest_rank(std::vector<float>& values, double share) {
+  if (values.empty()) return kNaN;
+  const double n = static_cast<double>(values.size());
+  const auto rank = static_cast<std::size_t>(std::max(1.0, std::ceil(share * n))) - 1;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(rank);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+DifferenceStatistics difference_statistics(const DifferenceMap& map) {
+  return statistics_of(map, 0, map.channels.size());
+}
+
+DifferenceStatistics channel_statistics(const DifferenceMap& map, std::size_t channel) {
+  if (channel >= map.channels.size()) throw std::invalid_argument("no such channel");
+  return statistics_of(map, channel, channel + 1);
 }
 
 DifferenceGate apply_limits(const DifferenceMap& map, const DifferenceLimits& limits) {
   require_valid(map, limits);
   DifferenceGate gate;
   gate.limits = limits;
-  gate.pixels = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
-  for (std::size_t i = 0; i < gate.pixels; ++i) {
+  gate.pixels = map.pixel_count();
+  const auto all = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
+  for (std::size_t i = 0; i < all; ++i) {
+    if (!map.counts(i)) continue;
     bool finite = true;
     double worst = 0.0;
     for (const auto& channel : map.channels) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <span>
 #include <string>
+#include <vector>
 
 #include "difference/agreement.h"
 #include "difference/difference_map.h"
@@ -15,7 +17,9 @@ struct SamplePosition {
   std::string channel;
 };
 
-/// Statistics of d = test - reference over all finite samples of a map, in the map's unit.
+/// Statistics of d = test - reference over the finite samples of a map that count, in its unit.
+/// relMSE: Rousselle, Knaus, Zwicker (2011), ACM Trans. Graph. 30(6), its epsilon of 0.01 scaled by
+/// the mean so that the number has no unit. SMAPE: Makridakis (1993), Int. J. Forecast. 9(4).
 struct DifferenceStatistics {
   std::size_t samples = 0;     ///< pixels x channels
   std::size_t not_finite = 0;  ///< samples with NaN or Inf in test or reference (left out below)
@@ -28,14 +32,25 @@ struct DifferenceStatistics {
   double max_absolute = 0.0;            ///< max |d|
   SamplePosition max_at;
   double p50 = 0.0, p95 = 0.0, p99 = 0.0;  ///< percentiles of |d|: smallest value that covers them
-  double rms_sigmas = 0.0;  ///< sqrt(mean z^2), 1 expected; NaN where no uncertainty is known
+  double relative_mse = 0.0;  ///< mean d^2 / (reference^2 + 0.01 m^2), m = mean |reference|
+  double smape = 0.0;         ///< mean 2 |d| / (|test| + |reference|), in [0, 2]; both 0: 0
+  double psnr_db = 0.0;       ///< 10 lg(max reference^2 / mean d^2); infinite where all are equal
+  double rms_sigmas = 0.0;    ///< sqrt(mean z^2), 1 expected; NaN where no uncertainty is known
 };
 DifferenceStatistics difference_statistics(const DifferenceMap& map);
+
+/// The same over one channel of the map.
+DifferenceStatistics channel_statistics(const DifferenceMap& map, std::size_t channel);
+
+/// The smallest of the values that at least the given share does not exceed; NaN if there is none.
+/// Reorders the values.
+double nearest_rank(std::vector<float>& values, double share);
 
 /// What a limit is compared with.
 enum class DifferenceScale {
   absolute,  ///< |d|, in the map's unit
   relative,  ///< |d| / |reference|; infinite on a black reference unless d = 0
+  percent,   ///< 100 times that
   sigmas,    ///< |d| / u
 };
 

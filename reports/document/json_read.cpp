@@ -111,9 +111,17 @@ Report read(const Json& json) {
   for (const auto& n : json.at("key_numbers"))
     report.key_numbers.push_back(
         {text(n, "label"), number(n.at("value")), text(n, "unit"), digits(n), text(n, "note")});
-  for (const auto& c : json.at("checks"))
-    report.checks.push_back({text(c, "name"), agreement(c, "outcome"), number(c.at("measured")),
-                             number(c.at("limit")), text(c, "unit"), text(c, "message")});
+  for (const auto& c : json.at("checks")) {
+    report.checks.push_back({text(c, "name"),
+                             agreement(c, "outcome"),
+                             number(c.at("measured")),
+                             number(c.at("limit")),
+                             text(c, "unit"),
+                             text(c, "message"),
+                             {}});
+    if (c.contains("earlier"))
+      for (const auto& value : c["earlier"]) report.checks.back().earlier.push_back(number(value));
+  }
   for (const auto& s : json.at("sections")) {
     Section section{text(s, "title"), {}};
     for (const auto& b : s.at("blocks")) section.blocks.push_back(block(b));
@@ -128,7 +136,12 @@ Report read(const Json& json) {
 
 Report from_json(const std::string& json_text, const std::string& file) {
   try {
-    return read(Json::parse(json_text));
+    // A hostile file may nest without end, and what walks the tree is recursive.
+    constexpr int kDeepest = 64;
+    return read(Json::parse(json_text, [](int depth, Json::parse_event_t, Json&) {
+      if (depth > kDeepest) throw std::invalid_argument("JSON nested deeper than 64 levels");
+      return true;
+    }));
   } catch (const Json::parse_error& error) {
     const auto end =
         json_text.begin() + static_cast<std::ptrdiff_t>(std::min(error.byte, json_text.size()));

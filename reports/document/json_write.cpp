@@ -29,9 +29,14 @@ Json write(const KeyNumber& n) {
 }
 
 Json write(const Check& c) {
-  return {{"name", text(c.name)},           {"outcome", to_text(c.outcome)},
-          {"measured", number(c.measured)}, {"limit", number(c.limit)},
-          {"unit", text(c.unit)},           {"message", text(c.message)}};
+  Json json = {{"name", text(c.name)},           {"outcome", to_text(c.outcome)},
+               {"measured", number(c.measured)}, {"limit", number(c.limit)},
+               {"unit", text(c.unit)},           {"message", text(c.message)}};
+  if (!c.earlier.empty()) {
+    json["earlier"] = Json::array();
+    for (double value : c.earlier) json["earlier"].push_back(number(value));
+  }
+  return json;
 }
 
 Json write(const Cell& cell) {

@@ -21,8 +21,11 @@ int exit_code(Agreement outcome) {
 void write_report(const std::filesystem::path& directory, const Report& report) {
   write_file_atomically(directory / "report.html", to_html(report));
   write_file_atomically(directory / "report.json", to_json(report));
-  write_file_atomically(directory / "junit.xml", to_junit(report));
+  write_file_atomically(directory / "junit.xml",
+                        to_junit(report, {(directory / "report.html").generic_string()}));
   write_file_atomically(directory / "summary.md", to_markdown(report));
+  write_file_atomically(directory / "badge.json", to_badge(report));
+  write_file_atomically(directory / "metrics.txt", to_openmetrics(report));
 }
 
 }  // namespace truebox

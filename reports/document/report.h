@@ -30,7 +30,8 @@ struct Check {
   double measured = 0.0;
   double limit = 0.0;
   std::string unit{};
-  std::string message{};  ///< what the number means, or what to do about it
+  std::string message{};          ///< what the number means, or what to do about it
+  std::vector<double> earlier{};  ///< measured in the runs before this one, the oldest first
 };
 
 /// A number for the row below the verdict.

@@ -17,11 +17,20 @@ std::string with_unit(double value, const std::string& unit) {
   return plain_number(value) + (unit.empty() || unit == "1" ? "" : " " + unit);
 }
 
-std::string property(const char* name, const std::string& value) {
-  return fmt::format("        <property name=\"{}\" value=\"{}\"/>\n", name, xml_escape(value));
+std::string property(const std::string& name, const std::string& value) {
+  return fmt::format("        <property name=\"{}\" value=\"{}\"/>\n", xml_escape(name),
+                     xml_escape(value));
 }
 
-std::string test_case(const std::string& suite, const Check& check) {
+/// The form in which GitLab and the Jenkins attachments plug-in look for a file.
+std::string attachment_lines(const std::vector<std::string>& attachments) {
+  std::string lines;
+  for (const std::string& path : attachments) lines += "\n[[ATTACHMENT|" + path + "]]";
+  return lines;
+}
+
+std::string test_case(const std::string& suite, const Check& check,
+                      const std::vector<std::string>& attachments) {
   const std::string summary = fmt::format("{}: measured {}, limit {}. {}", to_text(check.outcome),
                                           with_unit(check.measured, check.unit),
                                           with_unit(check.limit, check.unit), check.message);
@@ -33,7 +42,9 @@ std::string test_case(const std::string& suite, const Check& check) {
   if (is_failure(check))
     xml += fmt::format("      <failure message=\"{0}\" type=\"limit\">{0}</failure>\n",
                        xml_escape(summary));
-  xml += fmt::format("      <system-out>{}</system-out>\n    </testcase>\n", xml_escape(summary));
+  const std::string files = is_failure(check) ? attachment_lines(attachments) : "";
+  xml += fmt::format("      <system-out>{}</system-out>\n    </testcase>\n",
+                     xml_escape(summary + files));
   return xml;
 }
 
@@ -64,15 +75,20 @@ const char* icon(Agreement outcome) {
 
 }  // namespace
 
-std::string to_junit(const Report& report) {
+std::string to_junit(const Report& report, const std::vector<std::string>& attachments) {
   const std::string suite = xml_escape(report.title);
   const auto failures = std::count_if(report.checks.begin(), report.checks.end(), is_failure);
   const std::string counts =
       fmt::format("name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"0\" skipped=\"0\" time=\"0\"",
                   suite, report.checks.size(), failures);
   std::string xml = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites " + counts +
-                    ">\n  <testsuite " + counts + ">\n";
-  for (const auto& check : report.checks) xml += test_case(suite, check);
+                    ">\n  <testsuite " + counts + ">\n    <properties>\n";
+  xml += property("verdict", to_text(report.verdict.outcome)) +
+         property("sentence", report.verdict.sentence);
+  for (const auto& n : report.key_numbers) xml += property(n.label, with_unit(n.value, n.unit));
+  for (const auto& s : report.provenance) xml += property(s.name, s.value);
+  xml += "    </properties>\n";
+  for (const auto& check : report.checks) xml += test_case(suite, check, attachments);
   return xml + "  </testsuite>\n</testsuites>\n";
 }
 

@@ -12,6 +12,7 @@
 namespace truebox::codecs {
 
 Image read_exr(const std::filesystem::path& path);
+Image read_hdr(const std::filesystem::path& path);
 Image read_png(const std::filesystem::path& path);
 Image read_tiff(const std::filesystem::path& path);
 
@@ -25,5 +26,10 @@ void write_tiff16(const std::filesystem::path& path, int width, int height, int 
 /// A header may lie: larger images are refused before memory is asked for.
 inline constexpr std::size_t kMaxPixels = std::size_t{1} << 28;
 inline constexpr std::size_t kMaxSamples = std::size_t{1} << 31;
+
+/// Throws InputError where there are no pixels, more than these limits, or more than a file of that
+/// length can hold however it is compressed.
+void require_believable_size(const std::filesystem::path& path, std::int64_t width,
+                             std::int64_t height, std::int64_t samples_per_pixel);
 
 }  // namespace truebox::codecs

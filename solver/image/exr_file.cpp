@@ -2,12 +2,17 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
-#include <ImfInputFile.h>
+#include <ImfInputPart.h>
+#include <ImfMultiPartInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfPartType.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 #include <unistd.h>
 
+#include <cstdio>
+#include <cstdlib>
+#include <set>
 #include <stdexcept>
 
 #include "image/codecs.h"
@@ -16,6 +21,15 @@
 
 namespace truebox {
 namespace {
+
+// How the file is laid out, not what it shows; a file written from the image has its own.
+const std::set<std::string> kStructural = {"name", "type", "view"};
+
+std::string number(float value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.9g", static_cast<double>(value));
+  return text;
+}
 
 Imf::Slice float_slice(const float* samples, const Imath::Box2i& window, int width) {
   const std::ptrdiff_t offset = window.min.x + static_cast<std::ptrdiff_t>(window.min.y) * width;
@@ -26,27 +40,60 @@ Imf::Slice float_slice(const float* samples, const Imath::Box2i& window, int wid
 
 }  // namespace
 
-Image codecs::read_exr(const std::filesystem::path& path) try {
-  Imf::InputFile file(path.c_str(), 1);
-  const Imath::Box2i window = file.header().dataWindow();
-  Image image(window.max.x - window.min.x + 1, window.max.y - window.min.y + 1);
-  const Imf::ChannelList& list = file.header().channels();
-  std::size_t count = 0;
-  for (auto it = list.begin(); it != list.end(); ++it, ++count)
-    if (it.channel().xSampling != 1 || it.channel().ySampling != 1)
-      throw InputError(path.string(), 0, "channels at full resolution",
-                       std::string("subsampled channel ") + it.name());
-  if (image.pixel_count() > kMaxPixels || image.pixel_count() * count > kMaxSamples)
-    throw InputError(path.string(), 0, "an image of at most 2^31 samples", "a larger one");
-  for (auto it = list.begin(); it != list.end(); ++it) image.add_channel(it.name());
-  Imf::FrameBuffer buffer;
-  for (auto& channel : image.channels)
-    buffer.insert(channel.name, float_slice(channel.samples.data(), window, image.width));
-  file.setFrameBuffer(buffer);
-  file.readPixels(window.min.y, window.max.y);
-  for (auto it = file.header().begin(); it != file.header().end(); ++it)
+namespace {
+
+void require_flat_parts(const std::filesystem::path& path, const Imf::MultiPartInputFile& file) {
+  for (int p = 0; p < file.parts(); ++p) {
+    const Imf::Header& header = file.header(p);
+    const std::string name = header.hasName() ? "part \"" + header.name() + "\"" : "the image";
+    if (header.hasType() && Imf::isDeepData(header.type()))
+      throw InputError(path.string(), 0, "one sample a pixel (flatten deep images first)",
+                       name + " is deep");
+    if (header.dataWindow() != file.header(0).dataWindow())
+      throw InputError(path.string(), 0, "parts of one size and place", name + " has another");
+    for (auto it = header.channels().begin(); it != header.channels().end(); ++it)
+      if (it.channel().xSampling != 1 || it.channel().ySampling != 1)
+        throw InputError(path.string(), 0, "channels at full resolution",
+                         std::string("subsampled channel ") + it.name());
+  }
+}
+
+// Text, and the two attributes of other types that say what numbers mean.
+void read_attributes(const Imf::Header& header, Image& image) {
+  for (auto it = header.begin(); it != header.end(); ++it)
     if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute()))
-      image.attributes[it.name()] = text->value();
+      if (!kStructural.contains(it.name())) image.attributes[it.name()] = text->value();
+  if (Imf::hasWhiteLuminance(header))
+    image.attributes["whiteLuminance"] = number(Imf::whiteLuminance(header));
+}
+
+}  // namespace
+
+Image codecs::read_exr(const std::filesystem::path& path) try {
+  Imf::MultiPartInputFile file(path.c_str(), 1);
+  require_flat_parts(path, file);
+  const Imath::Box2i window = file.header(0).dataWindow();
+  std::size_t count = 0;
+  for (int p = 0; p < file.parts(); ++p)
+    for (auto it = file.header(p).channels().begin(); it != file.header(p).channels().end(); ++it)
+      ++count;
+  require_believable_size(path, std::int64_t{window.max.x} - window.min.x + 1,
+                          std::int64_t{window.max.y} - window.min.y + 1,
+                          static_cast<std::int64_t>(count));
+  Image image(window.max.x - window.min.x + 1, window.max.y - window.min.y + 1);
+  image.channels.reserve(count);
+  for (int p = 0; p < file.parts(); ++p) {
+    const Imf::Header& header = file.header(p);
+    Imf::InputPart part(file, p);
+    Imf::FrameBuffer buffer;
+    for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
+      Channel& channel = image.add_channel(p == 0 ? it.name() : header.name() + "." + it.name());
+      buffer.insert(it.name(), float_slice(channel.samples.data(), window, image.width));
+    }
+    part.setFrameBuffer(buffer);
+    part.readPixels(window.min.y, window.max.y);
+  }
+  read_attributes(file.header(0), image);
   return image;
 } catch (const InputError&) {
   throw;
@@ -63,7 +110,10 @@ void write_exr(const std::filesystem::path& path, const Image& image) {
     header.compression() = Imf::ZIP_COMPRESSION;
     Imf::addChromaticities(header, Imf::Chromaticities());  // BT.709 primaries, D65
     for (const auto& [name, value] : image.attributes)
-      header.insert(name, Imf::StringAttribute(value));
+      if (name == "whiteLuminance")
+        Imf::addWhiteLuminance(header, std::strtof(value.c_str(), nullptr));
+      else
+        header.insert(name, Imf::StringAttribute(value));
     Imf::FrameBuffer buffer;
     for (const auto& channel : image.channels) {
       header.channels().insert(channel.name, Imf::Channel(Imf::FLOAT));

@@ -31,7 +31,10 @@ Image read_image(const std::filesystem::path& path) {
   if (starts_with({0x89, 'P', 'N', 'G'})) return codecs::read_png(path);
   if (starts_with({'I', 'I', 42, 0}) || starts_with({'M', 'M', 0, 42}))
     return codecs::read_tiff(path);
-  throw InputError(path.string(), 0, "an OpenEXR, PNG or TIFF image", "another kind of file");
+  if (starts_with({'#', '?', 'R', 'A'}) || starts_with({'#', '?', 'R', 'G'}))
+    return codecs::read_hdr(path);
+  throw InputError(path.string(), 0, "an OpenEXR, PNG, TIFF or Radiance image",
+                   "another kind of file");
 }
 
 void write_counts(const std::filesystem::path& path, const Image& image,

@@ -10,13 +10,18 @@
 
 namespace truebox {
 
-/// Reads EXR (half or float; first part), PNG (8 or 16 bit) or TIFF (8 or 16 bit, float), by
-/// content. Integer samples keep their digital numbers (DN), nothing is linearised or scaled;
-/// palette PNGs keep their indices. InputError: missing, truncated, or of another kind.
+/// Reads EXR (half, float or integer), PNG (8 or 16 bit), TIFF (8 or 16 bit, float) or Radiance
+/// pictures (EXPOSURE divided out), by content. Integer samples keep their digital numbers (DN),
+/// nothing is linearised or scaled, NaN and Inf stay; palette PNGs keep their indices.
+/// Of an EXR with several parts, the first part's channels keep their names, others are called
+/// "<part>.<channel>". InputError: missing, truncated, of another kind; EXR parts that are deep
+/// (several samples a pixel) or of different windows, which are no one image.
 Image read_image(const std::filesystem::path& path);
 
-/// Writes float32 OpenEXR (ZIP), text attributes included. The file appears under its final name
-/// only when complete. Throws std::runtime_error when the disk refuses.
+/// Writes float32 OpenEXR (ZIP), text attributes included; chromaticities are BT.709's, attribute
+/// "whiteLuminance" (a number, cd m^-2 of R = G = B = 1) is written as the standard's own type. The
+/// file appears under its final name only when complete. Throws std::runtime_error when the disk
+/// refuses.
 void write_exr(const std::filesystem::path& path, const Image& image);
 
 /// Writes whole digital numbers (0 to 65535) of one channel or of three as 16-bit grey or RGB, PNG

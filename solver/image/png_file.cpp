@@ -36,7 +36,7 @@ Image codecs::read_png(const std::filesystem::path& path) try {
               static_cast<int>(png_get_image_height(reader.png, reader.info)));
   const int depth = png_get_bit_depth(reader.png, reader.info);
   const int planes = png_get_channels(reader.png, reader.info);
-  if (image.pixel_count() > kMaxPixels) throw std::runtime_error("more than 2^28 pixels");
+  require_believable_size(path, image.width, image.height, planes);
   if (depth < 8) png_set_packing(reader.png);  // one index a byte, not scaled
   png_set_interlace_handling(reader.png);
   png_read_update_info(reader.png, reader.info);
@@ -61,6 +61,12 @@ Image codecs::read_png(const std::filesystem::path& path) try {
         image.channels[c].samples[image.index(x, y)] = static_cast<float>(dn);
       }
   image.attributes["unit"] = "DN";
+  // Colours of 8 bit are made for displays; those of 16 bit are a sensor's counts, which are
+  // linear.
+  if (planes >= 3 && depth == 8) {
+    image.attributes["transfer"] = "sRGB";
+    image.attributes["white_dn"] = "255";
+  }
   return image;
 } catch (const InputError&) {
   throw;

@@ -2,9 +2,10 @@
 #include "image/spectral_image.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <numeric>
+#include <map>
 #include <stdexcept>
 
 namespace truebox {
@@ -18,11 +19,27 @@ std::string spectral_channel_name(double wavelength_nm) {
 }
 
 double spectral_channel_wavelength_nm(const std::string& name) {
-  if (!name.starts_with("S0.") || !name.ends_with("nm")) return -1.0;
-  std::string number = name.substr(3, name.size() - 5);
+  static const std::map<std::string, double> kMetres = {
+      {"nm", 1e-9}, {"um", 1e-6}, {"mm", 1e-3}, {"pm", 1e-12}, {"m", 1.0}};
+  static const std::map<std::string, double> kHertz = {{"Hz", 1.0},  {"kHz", 1e3},  {"MHz", 1e6},
+                                                       {"GHz", 1e9}, {"THz", 1e12}, {"PHz", 1e15}};
+  constexpr double kSpeedOfLight_m_s = 299792458.0;
+  if (!name.starts_with("S0.")) return -1.0;
+  const std::size_t unit_at = name.find_last_of("0123456789,.") + 1;
+  const std::string unit = name.substr(unit_at);
+  std::string number = name.substr(3, unit_at - 3);
   std::replace(number.begin(), number.end(), ',', '.');
-  if (number.empty() || number.find_first_not_of("0123456789.") != std::string::npos) return -1.0;
-  return std::strtod(number.c_str(), nullptr);
+  if (number.empty() || number.find_first_not_of("0123456789.eE+-") != std::string::npos)
+    return -1.0;
+  char* end = nullptr;
+  const double value = std::strtod(number.c_str(), &end);
+  if (*end != '\0' || !(value > 0.0) || !std::isfinite(value)) return -1.0;
+  if (unit == "nm") return value;  // the common case, without rounding
+  if (const auto metres = kMetres.find(unit); metres != kMetres.end())
+    return value * metres->second * 1e9;
+  if (const auto hertz = kHertz.find(unit); hertz != kHertz.end())
+    return kSpeedOfLight_m_s / (value * hertz->second) * 1e9;
+  return -1.0;
 }
 
 SpectralChannels spectral_channels(const Image& image) {
@@ -64,6 +81,8 @@ void add_display_channels(Image& image, const WavelengthGrid& grid, const Observ
   image.attributes["emissiveUnits"] =
       "W.m^-2.sr^-1";  // the layout's own wording; "unit" says per nm
   image.attributes["colorInteropID"] = "lin_rec709_scene";
+  // R = G = B = 1 has integral(L ybar) = 1, which is 683 cd m^-2.
+  image.attributes["whiteLuminance"] = "683";
 }
 
 }  // namespace truebox

@@ -61,14 +61,14 @@ Image codecs::read_tiff(const std::filesystem::path& path) try {
       (planes > 1 && layout != PLANARCONFIG_CONTIG) || TIFFIsTiled(tiff.get()))
     throw InputError(path.string(), 0, "a strip TIFF of 1 to 4 samples, 8/16 bit or float32",
                      std::to_string(planes) + " samples of " + std::to_string(bits) + " bits");
-  if (width == 0 || height == 0 || std::size_t{width} * height > kMaxPixels)
-    throw InputError(path.string(), 0, "1 to 2^28 pixels",
-                     std::to_string(width) + " x " + std::to_string(height));
+  require_believable_size(path, width, height, planes);
   Image image(static_cast<int>(width), static_cast<int>(height));
   static const char* const kNames[4][4] = {
       {"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
   for (int c = 0; c < planes; ++c) image.add_channel(kNames[planes - 1][c]);
   std::vector<unsigned char> row(static_cast<std::size_t>(TIFFScanlineSize(tiff.get())));
+  if (row.size() < std::size_t{width} * planes * bits / 8)  // subsampled colours
+    throw InputError(path.string(), 0, "every sample of a pixel", "fewer");
   for (std::uint32_t y = 0; y < height; ++y) {
     if (TIFFReadScanline(tiff.get(), row.data(), y) < 0)
       throw std::runtime_error("row " + std::to_string(y) + " is missing (" + last_error + ")");

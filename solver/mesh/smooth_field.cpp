@@ -7,77 +7,12 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
+
+#include "mesh/patch_topology.h"
+#include "mesh/wachspress.h"
 
 namespace truebox {
 namespace {
-
-using Edge = std::pair<std::uint32_t, std::uint32_t>;
-
-Edge edge_of(std::uint32_t a, std::uint32_t b) { return {std::min(a, b), std::max(a, b)}; }
-
-bool lies_on(const Vec3& point, const ContactLine& line, double tolerance_m) {
-  const Vec3 along = line.to - line.from;
-  const double t = std::clamp(along.dot(point - line.from) / along.squaredNorm(), 0.0, 1.0);
-  return (point - line.from - t * along).norm() < tolerance_m;
-}
-
-// Which elements share an edge or a vertex. Elements on two sides of a contact line share neither:
-// a block, or a wall too thin to bury anything, keeps its two sides apart.
-struct Topology {
-  std::vector<std::vector<std::uint32_t>> patches_at;  // vertex -> elements
-  std::map<Edge, std::array<std::uint32_t, 2>> patches_along;
-  static constexpr std::uint32_t kNone = ~0u;
-
-  explicit Topology(const PatchMesh& mesh) : patches_at(mesh.vertices.size()) {
-    for (std::uint32_t p = 0; p < mesh.size(); ++p) {
-      const auto corners = mesh.corners_of(mesh.patches[p]);
-      for (std::size_t k = 0; k < corners.size(); ++k) {
-        patches_at[corners[k]].push_back(p);
-        auto [it, is_new] = patches_along.try_emplace(
-            edge_of(corners[k], corners[(k + 1) % corners.size()]), std::array{p, kNone});
-        if (!is_new) it->second[1] = p;
-      }
-    }
-    for (auto& [edge, sides] : patches_along) {
-      const Piece& piece = mesh.pieces[mesh.patches[sides[0]].piece];
-      for (const ContactLine& line : piece.contacts)
-        if (lies_on(mesh.vertices[edge.first], line, 1e-6 * piece.diameter_m) &&
-            lies_on(mesh.vertices[edge.second], line, 1e-6 * piece.diameter_m))
-          sides = {kNone, kNone};
-    }
-  }
-};
-
-// Usable elements within `rings` vertex rings of a vertex that can be reached from `start` over
-// edges between usable elements.
-std::vector<std::uint32_t> reachable(const PatchMesh& mesh, const Topology& topology,
-                                     const std::vector<char>& usable, std::uint32_t start,
-                                     std::uint32_t vertex, int rings) {
-  std::set<std::uint32_t> ring(topology.patches_at[vertex].begin(),
-                               topology.patches_at[vertex].end());
-  for (int r = 1; r < rings; ++r) {
-    std::set<std::uint32_t> wider = ring;
-    for (std::uint32_t p : ring)
-      for (std::uint32_t v : mesh.corners_of(mesh.patches[p]))
-        wider.insert(topology.patches_at[v].begin(), topology.patches_at[v].end());
-    ring.swap(wider);
-  }
-  std::vector<std::uint32_t> found{start};
-  std::set<std::uint32_t> seen{start};
-  for (std::size_t next = 0; next < found.size(); ++next) {
-    const auto corners = mesh.corners_of(mesh.patches[found[next]]);
-    for (std::size_t k = 0; k < corners.size(); ++k) {
-      const auto& pair =
-          topology.patches_along.at(edge_of(corners[k], corners[(k + 1) % corners.size()]));
-      const std::uint32_t other = pair[0] == found[next] ? pair[1] : pair[0];
-      if (other == Topology::kNone || !usable[other] || !ring.contains(other)) continue;
-      if (seen.insert(other).second) found.push_back(other);
-    }
-  }
-  std::sort(found.begin(), found.end());
-  return found;
-}
 
 using Monomials = Eigen::Matrix<double, 1, 6>;
 
@@ -143,14 +78,14 @@ void SmoothField::fit_corner(const PatchMesh& mesh, const std::vector<std::uint3
 SmoothField::SmoothField(const PatchMesh& mesh, const std::vector<char>& usable,
                          const BandMatrix& means)
     : mesh_(&mesh), corner_of_(mesh.corners.size(), 0) {
-  const Topology topology(mesh);
+  const PatchTopology topology(mesh);
   std::map<std::pair<std::uint32_t, std::vector<std::uint32_t>>, std::uint32_t> known;
   for (std::uint32_t p = 0; p < mesh.size(); ++p) {
     const Patch& patch = mesh.patches[p];
     for (std::uint32_t k = 0; k < patch.corner_count; ++k) {
       const std::uint32_t vertex = mesh.corners[patch.first_corner + k];
-      auto neighbours = reachable(mesh, topology, usable, p, vertex, 2);
-      if (neighbours.size() < 10) neighbours = reachable(mesh, topology, usable, p, vertex, 3);
+      auto neighbours = topology.reachable(usable, p, vertex, 2);
+      if (neighbours.size() < 10) neighbours = topology.reachable(usable, p, vertex, 3);
       const auto [it, is_new] =
           known.try_emplace({vertex, neighbours}, static_cast<std::uint32_t>(corners_.size()));
       corner_of_[patch.first_corner + k] = it->second;
@@ -222,32 +157,15 @@ std::uint32_t SmoothField::find_patch(std::uint32_t piece, const Vec3& point) co
 void SmoothField::evaluate(std::uint32_t patch_index, const Vec3& point,
                            Eigen::Ref<Eigen::VectorXd> values) const {
   const Patch& patch = mesh_->patches[patch_index];
-  const auto corners = mesh_->corners_of(patch);
-  const Vec3& normal = mesh_->plane_of(patch).normal;
-  const std::size_t n = corners.size();
-  std::array<double, 16> depth{}, lambda{};
-  const std::size_t count = std::min<std::size_t>(n, depth.size());
-  const auto vertex = [&](std::size_t k) -> const Vec3& { return mesh_->vertices[corners[k % n]]; };
-  const double floor_m = 1e-9 * std::sqrt(patch.area_m2);
-  for (std::size_t k = 0; k < count; ++k) {
-    const Vec3 along = vertex(k + 1) - vertex(k);
-    depth[k] = std::max(floor_m, normal.cross(along).dot(point - vertex(k)) / along.norm());
-  }
-  double total = 0.0;
-  for (std::size_t k = 0; k < count; ++k) {
-    const Vec3 before = (vertex(k) - vertex(k + n - 1)).normalized();
-    const Vec3 after = (vertex(k + 1) - vertex(k)).normalized();
-    lambda[k] =
-        std::max(0.0, normal.dot(before.cross(after))) / (depth[(k + n - 1) % n] * depth[k]);
-    total += lambda[k];
-  }
+  WachspressWeights lambda;
+  const std::size_t count = wachspress_weights(*mesh_, patch, point, lambda);
   values.setZero();
   for (std::size_t k = 0; k < count; ++k) {
     if (lambda[k] == 0.0) continue;
     const Corner& corner = corners_[corner_of_[patch.first_corner + k]];
     const Vec3 d = (point - corner.origin) / corner.size_m;
     values.noalias() +=
-        lambda[k] / total *
+        lambda[k] *
         (monomials(d.dot(corner.axis_u), d.dot(corner.axis_v)) * corner.coefficients).transpose();
   }
   values = values.cwiseMax(0.0);

@@ -27,6 +27,9 @@ struct Spectral {
 struct ReflectanceQuantity {
   static constexpr const char* unit = "1";
 };
+struct RefractiveIndexQuantity {  // ISO 80000-7, 7-5; real part or absorption index
+  static constexpr const char* unit = "1";
+};
 struct RadiantExitanceQuantity {
   static constexpr const char* unit = "W m^-2 nm^-1";
 };
@@ -41,6 +44,7 @@ struct RadianceQuantity {
 };
 
 using Reflectance = Spectral<ReflectanceQuantity>;
+using RefractiveIndex = Spectral<RefractiveIndexQuantity>;
 using RadiantExitance = Spectral<RadiantExitanceQuantity>;
 using Radiosity = Spectral<RadiosityQuantity>;  ///< leaving exitance, emitted + reflected
 using Irradiance = Spectral<IrradianceQuantity>;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "radiometry/input_error.h"
+
 namespace truebox {
 namespace {
 
@@ -18,8 +20,9 @@ std::vector<Facet> facets_of(const Scene& scene) {
   std::vector<Facet> facets;
   for (const Surface& surface : scene.surfaces) {
     const auto& rho = scene.material_of(surface).reflectance.values;
-    const bool reflects =
-        !surface.is_opening && std::any_of(rho.begin(), rho.end(), [](double r) { return r > 0; });
+    const bool reflects = !surface.is_opening &&
+                          (scene.material_of(surface).scattering != Scattering::lambertian ||
+                           std::any_of(rho.begin(), rho.end(), [](double r) { return r > 0; }));
     for (const Polygon& piece : surface.pieces)
       facets.push_back({&piece, plane_of(piece), surface.is_opening, reflects});
   }
@@ -63,6 +66,8 @@ bool proportional(const Scene& scene, std::size_t a, std::size_t b, double& scal
   scale = -1.0;
   for (const Material& m : scene.materials) {
     if (m.reflectance[a] != m.reflectance[b]) return false;
+    for (const RefractiveIndex* index : {&m.refractive_index, &m.absorption_index})
+      if (index->size() > 0 && (*index)[a] != (*index)[b]) return false;
     const double ea = m.exitance[a], eb = m.exitance[b];
     if (ea == 0.0 && eb == 0.0) continue;
     if (ea == 0.0) return false;
@@ -90,7 +95,32 @@ void find_distinct_bands(const Scene& scene, Requirements& needs) {
   }
 }
 
+const char* described(Scattering scattering) {
+  switch (scattering) {
+    case Scattering::mirror: return "a mirror";
+    case Scattering::rough_conductor: return "a rough conductor";
+    case Scattering::dielectric: return "a dielectric";
+    case Scattering::lambertian: break;
+  }
+  return "Lambertian";
+}
+
+const Surface* first_not_lambertian(const Scene& scene) {
+  for (const Surface& surface : scene.surfaces)
+    if (scene.material_of(surface).scattering != Scattering::lambertian) return &surface;
+  return nullptr;
+}
+
 }  // namespace
+
+void require_lambertian(const Scene& scene) {
+  if (const Surface* surface = first_not_lambertian(scene))
+    throw InputError(
+        scene.path, 0,
+        "Lambertian surfaces only, which is what radiosity can do (`truebox render "
+        "--method path` traces paths instead)",
+        "surface \"" + surface->name + "\", " + described(scene.material_of(*surface).scattering));
+}
 
 Requirements requirements(const Scene& scene) {
   Requirements needs;
@@ -99,6 +129,12 @@ Requirements requirements(const Scene& scene) {
   needs.occlusion = needs_occlusion(facets, tolerance);
   needs.interreflection = needs_interreflection(facets, tolerance);
   find_distinct_bands(scene, needs);
+  if (const Surface* surface = first_not_lambertian(scene)) {
+    needs.path_tracing = true;
+    needs.reasons.push_back("path tracing: needed, surface \"" + surface->name + "\" is " +
+                            described(scene.material_of(*surface).scattering) +
+                            "; radiosity knows Lambertian surfaces only");
+  }
 
   needs.reasons.push_back(
       needs.interreflection

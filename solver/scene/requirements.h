@@ -13,6 +13,7 @@ namespace truebox {
 struct Requirements {
   bool occlusion = true;        ///< false if no surface can come between two others
   bool interreflection = true;  ///< false if no lit side faces another, or all are black
+  bool path_tracing = false;    ///< true if a surface is not Lambertian: radiosity cannot do it
   std::vector<std::size_t> distinct_bands;  ///< bands to solve; the others are multiples of these
   std::vector<std::size_t> band_source;     ///< for each band, index into distinct_bands
   std::vector<double> band_scale;           ///< and its factor
@@ -22,5 +23,9 @@ struct Requirements {
 /// Decides by exact tests: half-spaces for visibility; equal reflectances and proportional emission
 /// for bands.
 Requirements requirements(const Scene& scene);
+
+/// InputError that names the surface and what to do if one is not Lambertian: radiosity would
+/// silently be wrong.
+void require_lambertian(const Scene& scene);
 
 }  // namespace truebox

@@ -12,12 +12,25 @@
 
 namespace truebox {
 
-/// Optical properties of an opaque Lambertian surface, one value a band; the back is black.
+/// How a surface scatters. Radiosity knows the first only; the others need path tracing.
+enum class Scattering {
+  lambertian,
+  mirror,           ///< ideal; `reflectance` at every angle, or Fresnel's of a smooth conductor
+  rough_conductor,  ///< GGX facets of `roughness`, Fresnel's reflectance of n + i k
+  dielectric,       ///< a smooth, clear interface: n behind the polygon, 1 on its lit side
+};
+
+/// Optical properties of a surface, one value a band. Opaque unless it is a dielectric; the back of
+/// an opaque surface is black.
 struct Material {
   std::string name;
-  Reflectance reflectance;   ///< 0 <= rho < 1
+  Reflectance reflectance;   ///< 0 <= rho < 1; of a Lambertian surface or a mirror
   RadiantExitance exitance;  ///< own emission, W m^-2 nm^-1 (or relative, where its source says so)
   TabulatedSpectrum exitance_spectrum = {};  ///< as its source tabulates it: finer than the bands
+  Scattering scattering = Scattering::lambertian;
+  RefractiveIndex refractive_index = {};  ///< n, empty where it means nothing
+  RefractiveIndex absorption_index = {};  ///< k of conductors
+  double roughness = 0.0;                 ///< GGX alpha of a rough conductor
 
   bool emits() const;
 };
@@ -32,7 +45,7 @@ struct Surface {
   bool two_sided = false;   ///< the second half of `pieces` are the backs of the first
 };
 
-/// Lambertian surfaces, their materials in each band, and the cameras that look at them. SI units.
+/// Surfaces, their materials in each band, and the cameras that look at them. SI units.
 struct Scene {
   std::string path;               ///< the file it came from
   double metres_per_unit = 1.0;   ///< of the file's length unit
@@ -49,5 +62,12 @@ struct Scene {
   /// Unit of radiosity and irradiance.
   const char* exitance_unit() const { return is_total ? "W m^-2" : Radiosity::unit(); }
 };
+
+/// The same scene in some of its bands only, in that order.
+Scene in_bands(const Scene& scene, const std::vector<std::size_t>& bands);
+
+/// The same, the bands named by their centres (within 0.01 nm). std::invalid_argument if one is
+/// missing.
+Scene in_bands_at(const Scene& scene, const std::vector<double>& centres_nm);
 
 }  // namespace truebox

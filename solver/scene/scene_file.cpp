@@ -181,25 +181,36 @@ class Reader {
     const auto& materials = table_of(need(root, "materials", "a table [materials.NAME]"), "tables");
     for (const auto& [key, node] : materials) {
       const toml::table& table = table_of(node, "a table [materials.NAME]");
-      allow_keys(table, {"reflectance", "exitance", "temperature_K"});
       Material material;
       material.name = std::string(key.str());
-      const toml::node& rho =
-          need(table, "reflectance", "reflectance = number, { nm, value } or { file, column }");
-      material.reflectance = Reflectance(spectrum(rho, "a reflectance"));
-      for (double r : material.reflectance.values)
-        if (r < 0.0 || r >= 1.0)
-          fail(rho, "0 <= reflectance < 1 (at 1 and above, energy would be created)",
-               std::to_string(r));
+      material.scattering = scattering(table);
+      material.reflectance = Reflectance(scene_.bands.size(), 0.0);
       material.exitance = RadiantExitance(scene_.bands.size(), 0.0);
-      if (const toml::node* exitance = table.get("exitance")) {
-        material.exitance_spectrum = tabulated(*exitance, "an exitance");
-        material.exitance = RadiantExitance(spectrum(*exitance, "an exitance"));
-        for (double e : material.exitance.values)
-          if (e < 0.0) fail(*exitance, "exitance >= 0", std::to_string(e));
+      switch (material.scattering) {
+        case Scattering::lambertian:
+          allow_keys(table, {"scattering", "reflectance", "exitance", "temperature_K"});
+          read_reflectance(table, material);
+          read_exitance(table, material);
+          if (const toml::node* temperature = table.get("temperature_K"))
+            add_thermal_emission(*temperature, material);
+          break;
+        case Scattering::mirror:
+          allow_keys(table, {"scattering", "reflectance", "refractive_index", "absorption_index"});
+          if (table.contains("refractive_index"))
+            read_conductor(table, material);
+          else
+            read_reflectance(table, material);
+          break;
+        case Scattering::rough_conductor:
+          allow_keys(table, {"scattering", "roughness", "refractive_index", "absorption_index"});
+          read_conductor(table, material);
+          read_roughness(table, material);
+          break;
+        case Scattering::dielectric:
+          allow_keys(table, {"scattering", "refractive_index"});
+          material.refractive_index = refractive_index(table);
+          break;
       }
-      if (const toml::node* temperature = table.get("temperature_K"))
-        add_thermal_emission(*temperature, material);
       scene_.materials.push_back(std::move(material));
     }
   }
@@ -219,6 +230,66 @@ class Reader {
                                                       centre + half, temperature_K);
       material.exitance[b] += (1.0 - material.reflectance[b]) * black;
     }
+  }
+
+  Scattering scattering(const toml::table& table) const {
+    static const std::map<std::string, Scattering> kKinds = {
+        {"lambertian", Scattering::lambertian},
+        {"mirror", Scattering::mirror},
+        {"rough-conductor", Scattering::rough_conductor},
+        {"dielectric", Scattering::dielectric}};
+    const toml::node* node = table.get("scattering");
+    if (!node) return Scattering::lambertian;
+    const char* kinds = "\"lambertian\", \"mirror\", \"rough-conductor\" or \"dielectric\"";
+    const auto found = kKinds.find(text(*node, kinds));
+    if (found == kKinds.end()) fail(*node, kinds, described(*node));
+    return found->second;
+  }
+
+  void read_reflectance(const toml::table& table, Material& material) {
+    const toml::node& rho =
+        need(table, "reflectance", "reflectance = number, { nm, value } or { file, column }");
+    material.reflectance = Reflectance(spectrum(rho, "a reflectance"));
+    for (double r : material.reflectance.values)
+      if (r < 0.0 || r >= 1.0)
+        fail(rho, "0 <= reflectance < 1 (at 1 and above, energy would be created)",
+             std::to_string(r));
+  }
+
+  void read_exitance(const toml::table& table, Material& material) {
+    const toml::node* exitance = table.get("exitance");
+    if (!exitance) return;
+    material.exitance_spectrum = tabulated(*exitance, "an exitance");
+    material.exitance = RadiantExitance(spectrum(*exitance, "an exitance"));
+    for (double e : material.exitance.values)
+      if (e < 0.0) fail(*exitance, "exitance >= 0", std::to_string(e));
+  }
+
+  RefractiveIndex refractive_index(const toml::table& table) {
+    const toml::node& node = need(table, "refractive_index",
+                                  "refractive_index = number, { nm, value } or { file, column }");
+    RefractiveIndex n(spectrum(node, "a refractive index"));
+    for (double value : n.values)
+      if (!(value > 0.0)) fail(node, "a refractive index above 0", std::to_string(value));
+    return n;
+  }
+
+  void read_conductor(const toml::table& table, Material& material) {
+    if (const toml::node* rho = table.get("reflectance"))
+      fail(*rho, "a reflectance or optical constants, which say the same", "both");
+    material.refractive_index = refractive_index(table);
+    const toml::node& node = need(table, "absorption_index",
+                                  "absorption_index = number, { nm, value } or { file, column }");
+    material.absorption_index = RefractiveIndex(spectrum(node, "an absorption index"));
+    for (double value : material.absorption_index.values)
+      if (value < 0.0) fail(node, "an absorption index of 0 or more", std::to_string(value));
+  }
+
+  void read_roughness(const toml::table& table, Material& material) const {
+    const toml::node& node = need(table, "roughness", "roughness = number, the GGX alpha");
+    material.roughness = number(node);
+    if (material.roughness < 0.01 || material.roughness > 1.0)
+      fail(node, "0.01 <= roughness <= 1 (smoother is a mirror)", described(node));
   }
 
   std::size_t material_index(const toml::node& node) const {
@@ -297,6 +368,8 @@ class Reader {
       if (const toml::node* two_sided = table.get("two_sided")) {
         if (!two_sided->is_boolean()) fail(*two_sided, "true or false", described(*two_sided));
         surface.two_sided = *two_sided->value<bool>();
+        if (surface.two_sided && scene_.material_of(surface).scattering == Scattering::dielectric)
+          fail(*two_sided, "one side: a dielectric has its medium behind it", "two");
         if (surface.two_sided) add_back_sides(surface.pieces);
       }
       scene_.surfaces.push_back(std::move(surface));

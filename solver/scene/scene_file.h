@@ -10,8 +10,8 @@ namespace truebox {
 /// Reads a scene file (TOML): length_unit, [bands], [materials.*], [[surfaces]], [[openings]],
 /// [cameras.*]. Spectral files are looked for beside the scene file.
 /// InputError (file, line, what was expected, what stands there) for unknown keys, unknown
-/// materials, rho outside [0, 1), negative emission, numbers that are not finite, polygons without
-/// area or (beyond quads) not planar.
+/// materials, rho outside [0, 1), negative emission, optical constants that no matter has, numbers
+/// that are not finite, polygons without area or (beyond quads) not planar.
 Scene read_scene(const std::filesystem::path& path);
 
 }  // namespace truebox

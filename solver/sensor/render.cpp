@@ -18,6 +18,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+constexpr double kDark = 1e-300;  // keeps an infinite share of nothing from being not a number
+
 constexpr std::uint32_t kNothing = ~0u, kBack = ~0u - 1;
 
 // Sums of one pixel over its points.
@@ -32,6 +34,10 @@ struct PixelSum {
   std::uint32_t first_seen = kNothing;
   bool mixed = false;
 
+  VectorXd mean() const { return sum / points; }
+  VectorXd sampling_bound() const {
+    return std::pow(points, mixed ? -0.75 : -1.0) * (most - least);
+  }
   void clear() { *this = PixelSum(sum.size()); }
 };
 
@@ -44,18 +50,43 @@ double radical_inverse(unsigned index) {  // base 2 (van der Corput 1935)
 
 class Renderer {
  public:
-  Renderer(const Prediction& prediction, const Camera& camera)
+  Renderer(const Prediction& prediction, const Camera& camera, PixelFilter filter)
       : prediction_(prediction),
         camera_(camera),
+        filter_(filter),
         bands_(static_cast<Index>(prediction.scene().bands.size())) {}
 
-  // Hammersley points: n of them see an edge in any direction to about n^-3/4.
-  void add_points(int x, int y, int per_side, PixelSum& pixel, Gather::Scratch& scratch) const {
-    const int count = per_side * per_side;
-    for (int k = 0; k < count; ++k)
-      add_point(
-          {x + (k + 0.5) / count, y + radical_inverse(static_cast<unsigned>(k)) + 0.5 / count},
-          pixel, scratch);
+  void add_points(int x, int y, int count, PixelSum& pixel, Gather::Scratch& scratch) const {
+    for (int k = 0; k < count; ++k) add_point(point_of(x, y, k, count), pixel, scratch);
+  }
+
+  // Puts what a gather finds at a few points in the place of the smooth field there. What the
+  // difference does between those points is added to the bound.
+  void gather_again(int x, int y, VectorXd& radiance, VectorXd& bound,
+                    Gather::Scratch& scratch) const {
+    VectorXd mean = VectorXd::Zero(bands_), own = mean, field = mean;
+    VectorXd least = VectorXd::Constant(bands_, INFINITY), most = -least;
+    for (int k = 0; k < kGatherPoints; ++k) {
+      VectorXd correction = VectorXd::Zero(bands_);
+      if (const auto seen = seen_at(point_of(x, y, k, kGatherPoints))) {
+        const BoundedIrradiance gathered = prediction_.irradiance_at(seen->point, seen->normal);
+        const BoundedIrradiance smooth =
+            prediction_.irradiance_on(seen->piece, seen->point, scratch);
+        correction = seen->rho.cwiseProduct(gathered.value - smooth.value) / std::numbers::pi;
+        own += seen->rho.cwiseProduct(gathered.error_bound) / std::numbers::pi;
+        field += seen->rho.cwiseProduct(smooth.error_bound) / std::numbers::pi;
+      }
+      mean += correction;
+      least = least.cwiseMin(correction);
+      most = most.cwiseMax(correction);
+    }
+    mean /= kGatherPoints;
+    const VectorXd tighter = bound + (own - field + most - least) / kGatherPoints;
+    for (Index b = 0; b < bands_; ++b) {
+      if (!(tighter[b] < bound[b])) continue;
+      radiance[b] = std::max(0.0, radiance[b] + mean[b]);
+      bound[b] = std::max(own[b] / kGatherPoints, tighter[b]);
+    }
   }
 
   // Whether a corner of the pixel sees another surface: a sliver that the points may have missed.
@@ -68,6 +99,29 @@ class Renderer {
   }
 
  private:
+  static constexpr int kGatherPoints = 4;
+
+  // Hammersley points: n of them see an edge in any direction to about n^-3/4.
+  PixelPosition point_of(int x, int y, int k, int count) const {
+    return {
+        x + filtered_position_px(filter_, (k + 0.5) / count),
+        y + filtered_position_px(filter_, radical_inverse(static_cast<unsigned>(k)) + 0.5 / count)};
+  }
+
+  struct Seen {
+    std::uint32_t piece;
+    Vec3 point, normal;
+    Eigen::Map<const VectorXd> rho;
+  };
+  std::optional<Seen> seen_at(PixelPosition position) const {
+    const auto hit = first_hit(position);
+    if (!hit || !hit->front) return std::nullopt;
+    const Piece& piece = prediction_.fine().mesh.pieces[hit->piece];
+    const Scene& scene = prediction_.scene();
+    const auto& rho = scene.material_of(scene.surfaces[piece.surface]).reflectance.values;
+    return Seen{hit->piece, hit->point, piece.plane.normal, {rho.data(), bands_}};
+  }
+
   static std::uint32_t seen_by(const std::optional<Visibility::Hit>& hit) {
     return !hit ? kNothing : hit->front ? hit->piece : kBack;
   }
@@ -103,6 +157,7 @@ class Renderer {
 
   const Prediction& prediction_;
   const Camera& camera_;
+  PixelFilter filter_;
   Index bands_;
 };
 
@@ -118,9 +173,10 @@ Image spectral_planes(const Camera& camera, const WavelengthGrid& bands) {
 RenderedImage render(const Prediction& prediction, const Camera& camera,
                      const RenderOptions& options) {
   const WavelengthGrid& bands = prediction.scene().bands;
-  RenderedImage result{spectral_planes(camera, bands), spectral_planes(camera, bands)};
-  const Renderer renderer(prediction, camera);
+  RenderedImage result{spectral_planes(camera, bands), spectral_planes(camera, bands), 0, 0};
+  const Renderer renderer(prediction, camera, options.filter);
   std::atomic<int> rows_done{0};
+  std::atomic<std::size_t> edge_pixels{0}, gathered_pixels{0};
   std::mutex progress_lock;
   tbb::parallel_for(tbb::blocked_range<int>(0, camera.height_px(), 2), [&](const auto& rows) {
     Gather::Scratch scratch;
@@ -128,20 +184,26 @@ RenderedImage render(const Prediction& prediction, const Camera& camera,
     for (int y = rows.begin(); y < rows.end(); ++y) {
       for (int x = 0; x < camera.width_px(); ++x) {
         pixel.clear();
-        renderer.add_points(x, y, options.samples_per_side, pixel, scratch);
-        if (pixel.mixed || renderer.corners_differ(x, y, pixel)) {
+        renderer.add_points(x, y, options.samples, pixel, scratch);
+        const bool is_even = !pixel.mixed && !renderer.corners_differ(x, y, pixel);
+        if (!is_even ||
+            (pixel.sampling_bound() - options.even_within * pixel.mean()).maxCoeff() > 0) {
           pixel.clear();
-          renderer.add_points(x, y, options.edge_samples_per_side, pixel, scratch);
-          pixel.mixed = true;
+          renderer.add_points(x, y, options.edge_samples, pixel, scratch);
+          pixel.mixed |= !is_even;
+          ++edge_pixels;
         }
-        const double rate = std::pow(pixel.points, pixel.mixed ? -0.75 : -1.0);
+        VectorXd radiance = pixel.mean();
+        VectorXd bound = pixel.bound / pixel.points + pixel.sampling_bound();
+        if ((bound - options.gather_above * radiance.cwiseMax(kDark)).maxCoeff() > 0.0) {
+          renderer.gather_again(x, y, radiance, bound, scratch);
+          ++gathered_pixels;
+        }
         const std::size_t index = result.radiance.index(x, y);
         for (std::size_t b = 0; b < bands.size(); ++b) {
           const auto k = static_cast<Index>(b);
-          result.radiance.channels[b].samples[index] =
-              static_cast<float>(pixel.sum[k] / pixel.points);
-          result.error_bound.channels[b].samples[index] = static_cast<float>(
-              pixel.bound[k] / pixel.points + rate * (pixel.most[k] - pixel.least[k]));
+          result.radiance.channels[b].samples[index] = static_cast<float>(radiance[k]);
+          result.error_bound.channels[b].samples[index] = static_cast<float>(bound[k]);
         }
       }
     }
@@ -151,6 +213,8 @@ RenderedImage render(const Prediction& prediction, const Camera& camera,
       options.progress("render", static_cast<double>(done) / camera.height_px());
     }
   });
+  result.edge_pixels = edge_pixels;
+  result.gathered_pixels = gathered_pixels;
   return result;
 }
 

@@ -50,7 +50,12 @@ TargetedPrediction predict_to_target(const Scene& scene, const PredictOptions& o
       std::sqrt(static_cast<double>(options.form_factors.memory_limit_bytes) / sizeof(double)));
   TargetedPrediction result;
   while (true) {
-    result.prediction = std::make_unique<Prediction>(scene, attempt);
+    try {
+      result.prediction = std::make_unique<Prediction>(scene, attempt);
+    } catch (const std::length_error&) {  // the mesh came out larger than foretold
+      if (result.steps.empty()) throw;
+      return result;
+    }
     const std::size_t elements = result.prediction->fine().mesh.size();
     const double bound = largest_relative_bound(*result.prediction);
     result.steps.push_back({elements, bound});
@@ -60,8 +65,7 @@ TargetedPrediction predict_to_target(const Scene& scene, const PredictOptions& o
     if (result.is_reached) return result;
     const double wanted = kReserve * std::pow(bound / relative_error, 2.0 / kGatheredOrder);
     const double growth = std::clamp(wanted, kSmallestStep, kLargestStep);
-    // The mesh may round up by a tenth: what would not fit is not tried.
-    const double limit = 0.9 * static_cast<double>(largest_matrix) / static_cast<double>(elements);
+    const double limit = static_cast<double>(largest_matrix) / static_cast<double>(elements);
     if (limit < kSmallestStep) return result;
     attempt.elements =
         static_cast<std::size_t>(static_cast<double>(attempt.elements) * std::min(growth, limit));

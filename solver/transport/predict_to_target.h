@@ -28,7 +28,8 @@ struct TargetedPrediction {
 /// foretells the elements the observed bound asks for (it falls like elements^(-3/4), the gathered
 /// order 1.5) and solves again until the bound is met or the form factors exceed the memory limit.
 /// The target is met by the bound, not by the foretelling. `options.elements` is the first attempt.
-/// Throws std::invalid_argument unless 0 < relative_error < 1.
+/// Throws std::invalid_argument unless 0 < relative_error < 1; std::length_error if not even the
+/// first attempt fits the memory limit.
 TargetedPrediction predict_to_target(const Scene& scene, const PredictOptions& options,
                                      double relative_error);
 

@@ -7,29 +7,16 @@
 #include <algorithm>
 
 #include "transport/grid_difference.h"
+#include "transport/sensitivity.h"
 
 namespace truebox {
 namespace {
 
 using Eigen::Index;
 
-constexpr int kGatherAgainDepth = 3;  // receivers within about half an element of the fine grid
+constexpr int kFinestSplit = 2;  // halvings of the coarsest of three grids
 
-Scene only_bands(const Scene& scene, const std::vector<std::size_t>& bands) {
-  Scene part = scene;
-  std::vector<double> centres;
-  centres.reserve(bands.size());
-  for (std::size_t b : bands) centres.push_back(scene.bands.centre_nm(b));
-  part.bands = WavelengthGrid::from_centres(std::move(centres));
-  for (std::size_t m = 0; m < scene.materials.size(); ++m)
-    for (auto [from, to] :
-         {std::pair{&scene.materials[m].reflectance.values, &part.materials[m].reflectance.values},
-          std::pair{&scene.materials[m].exitance.values, &part.materials[m].exitance.values}}) {
-      to->clear();
-      for (std::size_t b : bands) to->push_back((*from)[b]);
-    }
-  return part;
-}
+constexpr int kGatherAgainDepth = 3;  // receivers within about half an element of the fine grid
 
 BandMatrix reflectance_of(const PatchMesh& mesh, const Scene& scene) {
   BandMatrix rho(static_cast<Index>(mesh.size()), static_cast<Index>(scene.bands.size()));
@@ -60,11 +47,19 @@ BandMatrix mean_direct(const PatchMesh& mesh, const Gather& gather, Index bands)
 
 Prediction::Prediction(const Scene& scene, const PredictOptions& options)
     : scene_(&scene), needs_(requirements(scene)) {
-  distinct_scene_ = only_bands(scene, needs_.distinct_bands);
+  require_lambertian(scene);
+  distinct_scene_ = in_bands(scene, needs_.distinct_bands);
   const double edge_m = edge_for_count(scene, std::max<std::size_t>(1, options.elements / 16));
   if (needs_.interreflection)  // the finest grid decides; better told before the others are solved
-    require_memory(uniform_mesh(distinct_scene_, edge_m, 2).size(), options.form_factors);
-  for (int k = 2; k >= 0; --k) levels_[k] = solve_level(edge_m, 2 - k, options);
+    require_memory(uniform_mesh(distinct_scene_, edge_m, kFinestSplit).size(),
+                   options.form_factors);
+  for (int k = 2; k >= 0; --k) levels_[k] = solve_level(edge_m, kFinestSplit - k, options);
+  if (options.error_shares && needs_.interreflection) {
+    PredictOptions again = options;
+    again.form_factors.seed += 1000;
+    again.sensitivities = false;
+    error_shares_ = find_error_shares(*solve_level(edge_m, 1, again));
+  }
   visibility_ = std::make_unique<Visibility>(fine().mesh, scene);
 }
 
@@ -97,6 +92,8 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   grid.form_factors = factors.summary;
   grid.solve = solve_radiosity(factors, rho, source, options.solve, grid.reflected,
                                options.progress, &grid.indirect);
+  if (options.sensitivities && split == kFinestSplit)
+    differentiate(factors, rho, options.solve, grid);
   return level;
 }
 
@@ -112,6 +109,44 @@ SolveOutcome Prediction::outcome() const {
     if (level->solution.solve.outcome != SolveOutcome::converged)
       return level->solution.solve.outcome;
   return SolveOutcome::converged;
+}
+
+void Prediction::differentiate(const FormFactors& factors, const BandMatrix& rho,
+                               const SolveOptions& options, GridSolution& grid) const {
+  const DenseExchange exchange(factors);
+  const SolvedSystem system{exchange, rho, grid.direct, grid.indirect};
+  const auto surfaces = static_cast<Index>(distinct_scene_.surfaces.size());
+  for (std::size_t m = 0; m < distinct_scene_.materials.size(); ++m) {
+    std::vector<char> is_in_material(grid.mesh.size());
+    for (std::size_t i = 0; i < grid.mesh.size(); ++i)
+      is_in_material[i] =
+          distinct_scene_.surfaces[grid.mesh.surface_of(grid.mesh.patches[i])].material == m;
+    BandMatrix derivative, mean = BandMatrix::Zero(surfaces, rho.cols());
+    SolveOptions quiet = options;
+    quiet.on_progress = {};
+    reflectance_sensitivity(system, is_in_material, quiet, derivative);
+    Eigen::VectorXd area = Eigen::VectorXd::Zero(surfaces);
+    for (std::size_t i = 0; i < grid.mesh.size(); ++i) {
+      if (!grid.usable[i]) continue;
+      const auto s = static_cast<Index>(grid.mesh.surface_of(grid.mesh.patches[i]));
+      mean.row(s) += grid.mesh.patches[i].area_m2 * derivative.row(static_cast<Index>(i));
+      area[s] += grid.mesh.patches[i].area_m2;
+    }
+    for (Index s = 0; s < surfaces; ++s)
+      if (area[s] > 0.0) mean.row(s) /= area[s];
+    grid.radiosity_by_reflectance.push_back(std::move(mean));
+  }
+}
+
+std::vector<BandMatrix> Prediction::radiosity_by_reflectance() const {
+  std::vector<BandMatrix> all;
+  for (const BandMatrix& distinct : fine().radiosity_by_reflectance) {
+    BandMatrix expanded(distinct.rows(), static_cast<Index>(scene_->bands.size()));
+    for (Index s = 0; s < distinct.rows(); ++s)
+      expanded.row(s) = expand(distinct.row(s).transpose()).transpose();
+    all.push_back(std::move(expanded));
+  }
+  return all;
 }
 
 // The error bound is that of the finest grid's value, |I_h - I_2h|: a third of it moves the value

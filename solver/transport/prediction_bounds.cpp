@@ -110,6 +110,40 @@ void Prediction::share_bounds_at_contacts() const {
   }
 }
 
+ErrorShares Prediction::find_error_shares(const Level& resampled) const {
+  const PatchMesh& next = coarse().mesh;
+  Eigen::RowVectorXd mean = Eigen::RowVectorXd::Zero(fine().direct.cols()), sampling = mean;
+  double area = 0.0;
+  for (std::size_t i = 0; i < next.size(); ++i) {
+    const auto row = static_cast<Index>(i);
+    if (!coarse().usable[i] || scene_->surfaces[next.surface_of(next.patches[i])].is_opening)
+      continue;
+    area += next.patches[i].area_m2;
+    mean += next.patches[i].area_m2 * (coarse().direct.row(row) + coarse().indirect.row(row));
+    sampling += next.patches[i].area_m2 *
+                (coarse().indirect.row(row) - resampled.solution.indirect.row(row)).cwiseAbs();
+  }
+  const BandMatrix bound = surface_irradiance_bound();
+  Eigen::VectorXd grids = Eigen::VectorXd::Zero(bound.cols());
+  for (std::size_t s = 0; s < scene_->surfaces.size(); ++s) {
+    if (scene_->surfaces[s].is_opening) continue;
+    double surface_m2 = 0.0;
+    for (const Polygon& piece : scene_->surfaces[s].pieces) surface_m2 += area_vector(piece).norm();
+    grids += surface_m2 * bound.row(static_cast<Index>(s)).transpose();
+  }
+  const Eigen::VectorXd total = expand(mean.transpose()), rays = expand(sampling.transpose()),
+                        solver = expand(solver_bounds());
+  ErrorShares shares;
+  for (Index k = 0; k < total.size(); ++k) {
+    if (!(total[k] > 0.0)) continue;
+    shares.form_factors = std::max(shares.form_factors, rays[k] / total[k]);
+    shares.solver = std::max(shares.solver, solver[k] * area / total[k]);
+    shares.discretisation =
+        std::max(shares.discretisation, (grids[k] - solver[k] * area) / total[k]);
+  }
+  return shares;
+}
+
 BandMatrix Prediction::surface_irradiance_bound() const {
   const auto surfaces = static_cast<Index>(scene_->surfaces.size());
   BandMatrix all = BandMatrix::Zero(surfaces, static_cast<Index>(scene_->bands.size()));

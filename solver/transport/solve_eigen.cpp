@@ -81,8 +81,8 @@ void solve_by(SolveState& s) {
       method.setMaxIterations(s.options.iteration_limit);
       const Eigen::VectorXd emission = s.source.col(band), guess = s.b.col(band);
       if (emission.isZero(0.0)) continue;
-      s.b.col(band) = (s.rho.col(band).array() > 0.0)
-                          .select(method.solveWithGuess(emission, guess), emission);
+      s.b.col(band) =
+          (s.rho.col(band).array() > 0.0).select(method.solveWithGuess(emission, guess), emission);
       steps = std::max(steps, static_cast<int>(method.iterations()));
     }
     s.summary.iterations += steps;

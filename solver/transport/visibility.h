@@ -9,9 +9,8 @@
 
 namespace truebox {
 
-/// Ray queries against a scene's pieces (Embree). Surfaces block light from both sides, openings
-/// do not. Embree computes in float: geometry is centred and scaled to unit size first, and end
-/// points are lifted off their surface by `offset_m`.
+/// Ray queries against a scene's pieces. Surfaces block light from both sides, openings do not.
+/// The rays compute in float: end points are lifted off their surface by `offset_m`.
 class Visibility {
  public:
   /// What a ray meets first; the point is recomputed in double on the piece's plane.

@@ -121,11 +121,33 @@ quantum_efficiency = { R = 0.3, G = 0.4, B = 0.2 }
 
 TEST_F(Program, EveryCommandHasHelpWithAnExample) {
   for (const char* command : {"", "demo", "plan", "solve", "probe", "render", "calibrate", "fit",
-                              "compare", "report", "validate"}) {
+                              "compare", "suite", "accept", "report", "validate", "export"}) {
     const Outcome help = run(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0) << command;
     EXPECT_THAT(help.text, HasSubstr("Example")) << command;
   }
+}
+
+TEST_F(Program, ExportsToEveryFormat) {
+  for (const std::string to : {"mitsuba", "pbrt", "radiance", "obj", "gltf"}) {
+    const Outcome done = run("export " + room() + " --to " + to + " -o " + file(to));
+    EXPECT_EQ(done.code, 0) << done.text;
+    EXPECT_THAT(done.text, HasSubstr("/" + to + "/scene."));
+    EXPECT_FALSE(fs::is_empty(folder_ / to));
+  }
+  EXPECT_EQ(run("export " + room() + " --to povray -o x").code, 64);
+  EXPECT_EQ(run("export " + room() + " --to pbrt -o " + file("x.rad")).code, 4);
+  EXPECT_EQ(run("export " + room() + " --to obj --rgb-bands 1 2 3 -o " + file("x")).code, 4);
+  EXPECT_FALSE(fs::exists(file("x")));
+}
+
+TEST_F(Program, SolvesIntoEveryKindOfFile) {
+  for (const char* name : {"s.json", "s.vtu", "s.glb", "s.html"}) {
+    const Outcome done = run("solve " + room() + " --elements 100 -o " + file(name));
+    EXPECT_EQ(done.code, 0) << done.text;
+    EXPECT_GT(text_of(file(name)).size(), 1000u) << name;
+  }
+  EXPECT_EQ(run("solve " + room() + " -o " + file("s.stl")).code, 4);
 }
 
 TEST_F(Program, WrongUsageIs64) {
@@ -324,6 +346,74 @@ TEST_F(Program, SensorCountsNeedASensorThatFitsTheFile) {
   EXPECT_EQ(deep.code, 4);
   EXPECT_THAT(deep.text, HasSubstr("1 to 16 bits"));
   EXPECT_FALSE(fs::exists(file("a.tif")));
+}
+
+TEST_F(Program, PathsGiveTheSameFileOnAnyNumberOfThreads) {
+  const std::string command = "render " + room() + " --method path --samples 32 --seed 7 ";
+  for (const std::string threads : {"1", "2"})
+    ASSERT_EQ(run(command + "--threads " + threads + " -o " + file("p.exr") + " --variance " +
+                  file("v" + threads + ".exr") + " --standard-error " + file("u.exr") + " --aov " +
+                  file("a.exr"))
+                  .code,
+              0);
+  EXPECT_EQ(text_of(file("v1.exr")).size(), text_of(file("v2.exr")).size());
+  const Image one = read_image(file("v1.exr")), two = read_image(file("v2.exr"));
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(one.channels[c].samples, two.channels[c].samples);
+  const Image picture = read_image(file("p.exr")), error = read_image(file("u.exr"));
+  const std::size_t middle = picture.index(8, 6), band = spectral_channels(picture).indices[1];
+  EXPECT_THAT(picture.attributes.at("source"), HasSubstr("simulated"));
+  EXPECT_GT(picture.channels[band].samples[middle], 0.01f);
+  EXPECT_GT(error.channels[1].samples[middle], 0.0f);
+  EXPECT_FLOAT_EQ(std::pow(error.channels[1].samples[middle], 2.0f),
+                  two.channels[1].samples[middle]);
+  EXPECT_EQ(two.attributes.at("degreesOfFreedom"), "15");
+}
+
+TEST_F(Program, AovsNameTheSurfaceThatAPixelSees) {
+  ASSERT_EQ(run("render " + room() + " --elements 200 -o " + file("r.exr") + " --aov " +
+                file("a.exr") + " --filter tent --samples-per-pixel 4 --gather-above 50")
+                .code,
+            0);
+  const Image aov = read_image(file("a.exr"));
+  const std::size_t middle = aov.index(8, 6), corner = aov.index(0, 0);
+  const auto value = [&](const char* channel, std::size_t at) {
+    return aov.find(channel)->samples[at];
+  };
+  EXPECT_EQ(aov.attributes.at("surface.3"), "wall");
+  EXPECT_EQ(value("surface.id", middle), 3.0f);
+  EXPECT_EQ(value("coverage", middle), 1.0f);
+  EXPECT_FLOAT_EQ(value("normal.Y", middle), -1.0f);
+  EXPECT_FLOAT_EQ(value("position.Y", middle), 1.0f);
+  EXPECT_GT(value("irradiance.550,000000nm", middle), 0.1f);
+  EXPECT_GT(value("irradiance_bound.550,000000nm", middle), 0.0f);
+  EXPECT_EQ(value("surface.id", corner), 0.0f);
+}
+
+TEST_F(Program, RadiosityRefusesAMirrorAndPathsTraceIt) {
+  std::string text = kSmallRoom;
+  const std::string old = "reflectance = { nm = [400, 700], value = [0.3, 0.8] }";
+  text.replace(text.find(old), old.size(), "scattering = \"mirror\"\nreflectance = 0.8");
+  const std::string scene = write("mirror.toml", text);
+  const Outcome plan = run("plan " + scene + " --json " + file("plan.json"));
+  EXPECT_EQ(plan.code, 0);
+  EXPECT_THAT(plan.text, HasSubstr("path tracing: needed, surface \"floor\" is a mirror"));
+  EXPECT_TRUE(nlohmann::json::parse(text_of(file("plan.json")))["path_tracing"].get<bool>());
+  for (const std::string& arguments :
+       {"solve " + scene, "render " + scene + " -o " + file("x.exr")}) {
+    const Outcome refused = run(arguments);
+    EXPECT_EQ(refused.code, 4) << arguments;
+    EXPECT_THAT(refused.text, HasSubstr("expected Lambertian surfaces only"));
+    EXPECT_THAT(refused.text, HasSubstr("--method path"));
+  }
+  EXPECT_FALSE(fs::exists(file("x.exr")));
+  EXPECT_EQ(run("render " + scene + " --method path --samples 16 -o " + file("x.exr")).code, 0);
+}
+
+TEST_F(Program, OptionsOfTheOtherMethodAreWrongUsage) {
+  for (const std::string options :
+       {"--method path --error-bound b.exr", "--method path --gather-above 1", "--variance v.exr",
+        "--standard-error s.exr", "--method path --samples 0", "--filter wide"})
+    EXPECT_EQ(run("render " + room() + " -o " + file("x.exr") + " " + options).code, 64) << options;
 }
 
 }  // namespace

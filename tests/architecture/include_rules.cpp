@@ -15,7 +15,8 @@ using Modules = std::set<std::string>;
 // Modules that each module may include, itself aside. Left to right; solver and reference never
 // meet, only calibration and reports see both.
 const std::map<std::string, Modules>& allowed_modules() {
-  static const Modules kSolver = {"radiometry", "image", "scene", "mesh", "transport", "sensor"};
+  static const Modules kSolver = {"radiometry", "image",       "scene",  "rays",  "mesh",
+                                  "transport",  "path_tracer", "sensor", "export"};
   static const Modules kReference = {"provenance", "analytic", "readings"};
   static const auto join = [](Modules a, const Modules& b) {
     a.insert(b.begin(), b.end());
@@ -29,9 +30,13 @@ const std::map<std::string, Modules>& allowed_modules() {
       {"solver/radiometry", {}},
       {"solver/image", {"radiometry"}},
       {"solver/scene", {"radiometry", "image"}},
+      {"solver/rays", {"radiometry", "image", "scene"}},
+      // The independent check: neither mesh nor transport, so that no error is common to both.
+      {"solver/path_tracer", {"radiometry", "image", "scene", "rays"}},
       {"solver/mesh", {"radiometry", "image", "scene"}},
-      {"solver/transport", {"radiometry", "image", "scene", "mesh"}},
+      {"solver/transport", {"radiometry", "image", "scene", "rays", "mesh"}},
       {"solver/sensor", {"radiometry", "image", "scene", "mesh", "transport"}},
+      {"solver/export", {"radiometry", "image", "scene", "mesh", "transport"}},
       {"reference/provenance", {"radiometry", "image"}},
       {"reference/analytic", {"radiometry", "image", "provenance"}},
       {"reference/readings", {"radiometry", "image", "provenance", "analytic"}},
@@ -43,7 +48,8 @@ const std::map<std::string, Modules>& allowed_modules() {
       {"reports/difference", kBoth},
       {"reports/colour", join(kBoth, {"difference"})},
       {"reports/figures", join(kBoth, {"difference", "colour"})},
-      {"reports/document", join(kBoth, {"difference", "colour", "figures"})}};
+      {"reports/document", join(kBoth, {"difference", "colour", "figures"})},
+      {"reports/walkthrough", join(kBoth, {"difference", "colour", "figures", "document"})}};
   return kAllowed;
 }
 
@@ -55,12 +61,13 @@ struct ThirdParty {
 
 const std::vector<ThirdParty>& third_parties() {
   static const std::vector<ThirdParty> kTable = {
-      {"embree3/", {"solver/transport"}},
+      {"embree3/", {"solver/rays"}},
       {"Imf", {"solver/image"}},
       {"OpenEXR/", {"solver/image"}},
       {"Imath", {"solver/image"}},
       {"half.h", {"solver/image"}},  // Imath's
       {"Iex", {"solver/image"}},
+      {"half.h", {"solver/image"}},  // Imath's
       {"png.h", {"solver/image"}},
       {"tiff", {"solver/image"}},
       {"toml++/", {"solver/scene", "reference/readings"}},
@@ -68,14 +75,16 @@ const std::vector<ThirdParty>& third_parties() {
       {"OpenColorIO/", {"reports/colour"}},
       {"mustache", {"reports/document"}},
       {"kainjow/", {"reports/document"}},
-      {"nlohmann/", {"reports/document"}},
+      {"nlohmann/", {"reports/document", "reports/walkthrough", "solver/export"}},
       {"zlib.h", {"reports/document"}},
-      {"fmt/", {"reports/"}},
+      {"fmt/", {"reports/", "solver/export"}},
       {"tbb/", {"solver/"}},
       {"unsupported/Eigen/", {"solver/transport"}},
       {"Eigen/", {"solver/", "calibration/"}, true},
       {"CLI/", {}},
+      {"opencv2/imgproc", {"reports/difference"}},  // image filters; a package of its own
       {"opencv2/", {"calibration/alignment"}},
+      {"boost/math/", {"calibration/uncertainty"}},
       {"gtest/", {}},
       {"gmock/", {}}};
   return kTable;

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -92,6 +93,41 @@ void print(const Kernels& k) {
   line("time of all bands : time of one", k.bands_time_ratio, "");
 }
 
+// Path tracing's error falls like n^-1/2: what it takes to reach the error of each radiosity
+// picture, from the longest run in the table.
+void print(const PictureBenchmark& pictures) {
+  fmt::print(
+      "\nA picture of 512 x 512 pixels in 7 bands, relative error of a pixel in %\n"
+      "{:>12}{:>10}{:>16}{:>10}{:>10}{:>10}{:>24}\n",
+      "method", "setting", "processor / s", "solve", "median", "p99", "paths take, x as long");
+  const auto& longest = *std::max_element(
+      pictures.rows.begin(), pictures.rows.end(), [](const auto& a, const auto& b) {
+        return (a.name == "paths" ? a.setting : 0) < (b.name == "paths" ? b.setting : 0);
+      });
+  for (const PictureError& row : pictures.rows) {
+    const double ratio = longest.p99 / row.p99;
+    fmt::print("{:>12}{:>10}{:>16.1f}{:>10.1f}{:>10.3f}{:>10.3f}{:>24}\n", row.name, row.setting,
+               row.processor_s, row.solve_s, 100.0 * row.median, 100.0 * row.p99,
+               row.name == "paths"
+                   ? ""
+                   : fmt::format("{:.0f}", longest.processor_s * ratio * ratio / row.processor_s));
+  }
+  fmt::print("  one standard error of the truth: median {:.3f}, p99 {:.3f}\n",
+             100.0 * pictures.truth_noise.median, 100.0 * pictures.truth_noise.p99);
+}
+
+nlohmann::json as_json(const PictureBenchmark& pictures) {
+  nlohmann::json json;
+  for (const PictureError& row : pictures.rows)
+    json.push_back({{"method", row.name},
+                    {"setting", row.setting},
+                    {"processor_s", row.processor_s},
+                    {"solve_processor_s", row.solve_s},
+                    {"median_relative_error", row.median},
+                    {"p99_relative_error", row.p99}});
+  return json;
+}
+
 void print(const std::vector<SolverWork>& solvers) {
   fmt::print("\nPasses over the matrix to a relative bound\n{:>12}{:>16}{:>16}{:>22}\n", "bound",
              "krylov", "gauss-seidel", "time, krylov = 1");
@@ -117,10 +153,23 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   program.add_option("--json", json_path, "also write every number as JSON");
   program.add_option("--reference", reference, "the folder of reference data");
+  bool only_pictures = false;
+  std::vector<int> samples{16, 64, 256, 1024};
+  program.add_flag("--only-pictures", only_pictures, "radiosity against path tracing, no more");
+  program.add_option("--samples", samples, "paths a pixel")->delimiter(',');
   CLI11_PARSE(program, argc, argv);
 
   const auto scene =
       truebox::read_scene(std::filesystem::path(reference) / "cornell_box" / "cornell_box.toml");
+  const auto pictures = [&] {
+    return measure_pictures(
+        truebox::in_bands_at(scene, {400.0, 452.0, 500.0, 552.0, 600.0, 652.0, 700.0}), elements,
+        samples);
+  };
+  if (only_pictures) {
+    print(pictures());
+    return 0;
+  }
   nlohmann::json json{{"threads", std::thread::hardware_concurrency()},
                       {"compiler", __VERSION__},
                       {"scene", "cornell_box"}};
@@ -156,6 +205,9 @@ int main(int argc, char** argv) {
   const auto solvers = measure_solvers(scene, kernel_elements, {1e-2, 1e-4, 1e-7, 1e-12});
   print(solvers);
   for (const SolverWork& work : solvers) json["solvers"].push_back(as_json(work));
+  const PictureBenchmark rendered = pictures();
+  print(rendered);
+  json["pictures"] = as_json(rendered);
   if (!json_path.empty()) {
     std::ofstream(json_path) << json.dump(2) << '\n';
     fmt::print("\n{}\n", json_path);

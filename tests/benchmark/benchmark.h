@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "scene/scene.h"
@@ -79,5 +80,20 @@ struct SolverWork {
 };
 std::vector<SolverWork> measure_solvers(const Scene& scene, std::size_t elements,
                                         const std::vector<double>& relative_bounds);
+
+/// Relative error of the pixels of one picture, 512 x 512 in the scene's bands, against a long path
+/// trace of some of its pixels; processor time of the whole picture, all threads together.
+struct PictureError {
+  std::string name;  ///< "radiosity", "paths"
+  int setting = 0;   ///< elements, paths a pixel
+  double processor_s = 0.0, solve_s = 0.0;
+  double median = 0.0, p99 = 0.0;
+};
+struct PictureBenchmark {
+  PictureError truth_noise;  ///< one standard error of the truth: a floor of all rows
+  std::vector<PictureError> rows;
+};
+PictureBenchmark measure_pictures(const Scene& scene, const std::vector<std::size_t>& elements,
+                                  const std::vector<int>& samples);
 
 }  // namespace truebox::benchmark

@@ -206,7 +206,7 @@ TEST(WorstOutcome, NothingCheckedIsNothingShown) {
   EXPECT_EQ(exit_code(worst_outcome({{"a", Agreement::agrees}})), 0);
 }
 
-TEST(WriteReport, LeavesTheFourFilesAndNothingElse) {
+TEST(WriteReport, LeavesItsFilesAndNothingElse) {
   const auto directory = std::filesystem::path(scratch_path("write_report"));
   std::filesystem::remove_all(directory);
   write_report(directory, sample());
@@ -214,7 +214,7 @@ TEST(WriteReport, LeavesTheFourFilesAndNothingElse) {
   for (const auto& entry : std::filesystem::directory_iterator(directory))
     names.push_back(entry.path().filename().string());
   EXPECT_THAT(names, testing::UnorderedElementsAre("report.html", "report.json", "junit.xml",
-                                                   "summary.md"));
+                                                   "summary.md", "badge.json", "metrics.txt"));
   std::filesystem::remove_all(directory);
 }
 

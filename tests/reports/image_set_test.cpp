@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "document/writers.h"
 #include "image/half.h"
@@ -80,6 +81,24 @@ TEST(ImageSet, TakesEveryNthPixelWhereAllWouldBeTooMany) {
   const float truth = reference.channels[2].samples[reference.index(4 * set.stride, set.stride)];
   EXPECT_NEAR(unpack_plane(set, 5)[static_cast<std::size_t>(set.width_px) + 4], truth,
               truth / 2048.0f);
+}
+
+TEST(ImageSet, APageOfNoiseStaysBelowTenMegabytes) {
+  // The worst that 512 x 512 x 7 can be: both sides and both uncertainties noisy, nothing alike.
+  std::mt19937 random(1);
+  Image noise[4];
+  for (Image& image : noise) {
+    image = Image(512, 512);
+    for (int b = 0; b < 7; ++b)
+      for (float& v : image.add_channel(spectral_channel_name(400.0 + 50.0 * b)).samples)
+        v = 1.0f + static_cast<float>(random() % 1024u) / 1024.0f;
+  }
+  Report report;
+  report.sections = {
+      {"Pictures",
+       {PictureRow{
+           {}, "", make_image_set({"T", &noise[0], &noise[1]}, {"R", &noise[2], &noise[3]})}}}};
+  EXPECT_LT(to_html(report).size(), 10'000'000u);
 }
 
 TEST(ImageSet, PairsBandsAsTheComparisonDoes) {

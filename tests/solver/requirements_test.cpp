@@ -3,8 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include "radiometry/input_error.h"
 #include "scene/scene_file.h"
 #include "support/tiny_scenes.h"
+#include "transport/prediction.h"
 
 namespace truebox {
 namespace {
@@ -63,6 +65,35 @@ TEST(Requirements, TheCornellBoxNeedsBoth) {
   EXPECT_TRUE(needs.occlusion);
   EXPECT_TRUE(needs.interreflection);
   EXPECT_EQ(needs.distinct_bands.size(), 76u);
+}
+
+TEST(Requirements, AMirrorNeedsPathTracingAndRadiosityRefusesIt) {
+  Scene scene = tiny::cube_with_block(1.0, 0.5);
+  EXPECT_FALSE(requirements(scene).path_tracing);
+  EXPECT_NO_THROW(require_lambertian(scene));
+  scene.materials.push_back({"silver", Reflectance(1, 0.9), RadiantExitance(1, 0.0)});
+  scene.materials.back().scattering = Scattering::mirror;
+  EXPECT_FALSE(requirements(scene).path_tracing) << "a material that nothing is made of";
+  scene.surfaces[7].material = 1;
+  EXPECT_TRUE(requirements(scene).path_tracing);
+  EXPECT_THAT(requirements(scene).reasons, testing::Contains(testing::HasSubstr("path tracing")));
+  try {
+    const Prediction prediction(scene, {});
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("\"block 1\", a mirror"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("--method path"));
+  }
+}
+
+TEST(Requirements, GlassOfAnotherIndexIsAnotherBand) {
+  Scene cube = tiny::cube(1.0, 0.5, 1.0);
+  cube.bands = WavelengthGrid::from_centres({450.0, 550.0});
+  cube.materials = {{"a", Reflectance(2, 0.5), RadiantExitance(2, 1.0)},
+                    {"glass", Reflectance(2, 0.0), RadiantExitance(2, 0.0)}};
+  cube.materials[1].scattering = Scattering::dielectric;
+  cube.materials[1].refractive_index = RefractiveIndex(std::vector<double>{1.52, 1.50});
+  EXPECT_EQ(requirements(cube).distinct_bands.size(), 2u);
 }
 
 }  // namespace

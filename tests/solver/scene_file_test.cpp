@@ -259,5 +259,85 @@ TEST(SceneFile, NamesAMissingFile) {
   }
 }
 
+// The white material of kGood written anew.
+std::string with_white(const std::string& lines) {
+  std::string text = kGood;
+  const std::string old = "reflectance = { nm = [400, 700], value = [0.2, 0.8] }";
+  return text.replace(text.find(old), old.size(), lines);
+}
+
+TEST(SceneFile, ReadsSurfacesThatAreNotLambertian) {
+  write_lamp();
+  const auto white = [](const std::string& lines) {
+    const Scene scene = read_scene(write("scene_file_test_shiny.toml", with_white(lines)));
+    for (const Material& m : scene.materials)
+      if (m.name == "white") return m;
+    return Material{};
+  };
+  const Material mirror = white("scattering = \"mirror\"\nreflectance = 0.9");
+  EXPECT_EQ(mirror.scattering, Scattering::mirror);
+  EXPECT_EQ(mirror.reflectance[3], 0.9);
+  const Material silver =
+      white("scattering = \"mirror\"\nrefractive_index = 0.1\nabsorption_index = 4");
+  EXPECT_EQ(silver.absorption_index[0], 4.0);
+  const Material copper = white(
+      "scattering = \"rough-conductor\"\nroughness = 0.2\n"
+      "refractive_index = { nm = [400, 700], value = [1.2, 0.2] }\nabsorption_index = 3");
+  EXPECT_EQ(copper.scattering, Scattering::rough_conductor);
+  EXPECT_EQ(copper.roughness, 0.2);
+  EXPECT_NEAR(copper.refractive_index[3], 0.2, 1e-12);
+  const Material glass = white("scattering = \"dielectric\"\nrefractive_index = 1.5");
+  EXPECT_EQ(glass.scattering, Scattering::dielectric);
+  EXPECT_EQ(glass.refractive_index.size(), 4u);
+  EXPECT_EQ(glass.reflectance[0], 0.0);
+}
+
+TEST(SceneFile, RefusesMaterialsThatNoMatterHas) {
+  write_lamp();
+  const struct {
+    const char *lines, *expected;
+  } kBad[] = {
+      {"scattering = \"shiny\"\nreflectance = 0.5", "\"lambertian\", \"mirror\""},
+      {"scattering = \"mirror\"\nreflectance = 1.0", "0 <= reflectance < 1"},
+      {"scattering = \"mirror\"", "reflectance = number"},
+      {"scattering = \"mirror\"\nreflectance = 0.5\nroughness = 0.1", "one of the keys"},
+      {"scattering = \"mirror\"\nreflectance = 0.5\nrefractive_index = 1\nabsorption_index = 1",
+       "which say the same"},
+      {"scattering = \"rough-conductor\"\nrefractive_index = 1\nabsorption_index = 1",
+       "roughness = number"},
+      {"scattering = \"rough-conductor\"\nrefractive_index = 1\nabsorption_index = 1\n"
+       "roughness = 0",
+       "0.01 <= roughness <= 1"},
+      {"scattering = \"rough-conductor\"\nrefractive_index = 1\nabsorption_index = -1\n"
+       "roughness = 0.5",
+       "absorption index of 0 or more"},
+      {"scattering = \"dielectric\"\nrefractive_index = 0", "a refractive index above 0"},
+      {"scattering = \"dielectric\"\nrefractive_index = 1.5\nexitance = 1", "one of the keys"},
+      {"scattering = \"dielectric\"", "refractive_index = number"}};
+  for (const auto& bad : kBad) {
+    try {
+      read_scene(write("scene_file_test_bad_material.toml", with_white(bad.lines)));
+      ADD_FAILURE() << bad.lines;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(bad.expected)) << bad.lines;
+      EXPECT_GT(error.line(), 0);
+    }
+  }
+}
+
+TEST(SceneFile, RefusesGlassWithTwoLitSides) {
+  write_lamp();
+  std::string text = with_white("scattering = \"dielectric\"\nrefractive_index = 1.5");
+  const std::string old = "material = \"lamp\"";
+  text.replace(text.find(old), old.size(), "material = \"white\"");
+  try {
+    read_scene(write("scene_file_test_two_sided_glass.toml", text));
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("medium behind it"));
+    EXPECT_EQ(error.line(), line_of(text, "two_sided"));
+  }
+}
+
 }  // namespace
 }  // namespace truebox

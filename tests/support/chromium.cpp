@@ -27,6 +27,7 @@ std::vector<std::string> command_line(int width_px, int height_px) {
           "--headless=new",
           "--no-sandbox",
           "--disable-gpu",
+          "--enable-unsafe-swiftshader",  // WebGL without a graphics card
           "--disable-dev-shm-usage",
           "--no-first-run",
           "--disable-background-networking",

@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "transport/galerkin.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "scene/requirements.h"
+#include "transport/moment_integrals.h"
+#include "transport/quadrature.h"
+
+namespace truebox {
+namespace {
+
+using Eigen::Index;
+
+constexpr int kResidualPoints = 8;  // each way, crowded towards the edges: see the test
+
+// Whether some of b lies before a.
+bool sees(const PolynomialElement& a, const PolynomialElement& b) {
+  double farthest = 0.0, size = 0.0;
+  for (const Vec3& corner : b.corners()) {
+    farthest = std::max(farthest, a.plane_distance_m(corner));
+    size = std::max(size, (corner - a.corners()[0]).norm());
+  }
+  return farthest > 1e-10 * size;
+}
+
+}  // namespace
+
+std::string GalerkinOptions::invalid() const {
+  if (degree < 0 || degree > kMaxElementDegree) return "degree must lie in [0, 6]";
+  if (!(relative_tolerance >= 1e-13 && relative_tolerance < 1.0))
+    return "relative_tolerance must lie in [1e-13, 1)";
+  if (!(relative_bound > 0.0 && relative_bound < 1.0)) return "relative_bound must lie in (0, 1)";
+  return {};
+}
+
+GalerkinSystem::GalerkinSystem(const PatchMesh& mesh, const Scene& scene,
+                               const GalerkinOptions& options)
+    : options_(options), surface_count_(scene.surfaces.size()) {
+  if (const std::string why = options.invalid(); !why.empty()) throw std::invalid_argument(why);
+  if (requirements(scene).occlusion)
+    throw std::invalid_argument(
+        "polynomial elements need a scene in which no surface can come between two others");
+  Polygon polygon;
+  for (const Patch& patch : mesh.patches) {
+    const std::size_t surface = mesh.surface_of(patch);
+    if (scene.surfaces[surface].is_opening) continue;
+    mesh.polygon_of(patch, polygon);
+    for (PolynomialElement& element : polynomial_elements(polygon, options.degree)) {
+      elements_.push_back(std::move(element));
+      surface_.push_back(surface);
+    }
+  }
+  number_unknowns();
+  FormFactorOptions memory;
+  memory.memory_limit_bytes = options.memory_limit_bytes;
+  require_memory(static_cast<std::size_t>(first_.back()), memory);
+  integrate_kernel();
+}
+
+void GalerkinSystem::number_unknowns() {
+  first_ = {0};
+  for (const PolynomialElement& e : elements_) first_.push_back(first_.back() + e.functions());
+  factors_.area_m2 = Eigen::VectorXd::Ones(first_.back());
+  factors_.usable.assign(static_cast<std::size_t>(first_.back()), 1);
+  factors_.summary.row_sum_max = 1.0;
+}
+
+void GalerkinSystem::integrate_kernel() {
+  Eigen::MatrixXd& k = factors_.exchange_area_m2;
+  k = Eigen::MatrixXd::Zero(first_.back(), first_.back());
+  tbb::parallel_for(std::size_t{0}, elements_.size(), [&](std::size_t i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!sees(elements_[i], elements_[j]) || !sees(elements_[j], elements_[i])) continue;
+      const Eigen::MatrixXd block =
+          exchange_moments(elements_[i], elements_[j], options_.relative_tolerance);
+      k.block(first_[i], first_[j], block.rows(), block.cols()) = block;
+      k.block(first_[j], first_[i], block.cols(), block.rows()) = block.transpose();
+    }
+  });
+}
+
+std::vector<Index> GalerkinSystem::unknowns_of_degree(int degree) const {
+  std::vector<Index> kept;
+  for (std::size_t e = 0; e < elements_.size(); ++e)
+    for (int f = 0; f < elements_[e].functions(); ++f)
+      if (elements_[e].has_at_degree(f, degree)) kept.push_back(first_[e] + f);
+  return kept;
+}
+
+GalerkinSystem GalerkinSystem::at_degree(int degree) const {
+  GalerkinSystem lower;
+  lower.options_ = options_;
+  lower.options_.degree = degree;
+  if (const std::string why = lower.options_.invalid(); !why.empty() || degree > options_.degree)
+    throw std::invalid_argument("degree must lie in [0, " + std::to_string(options_.degree) + "]");
+  lower.surface_count_ = surface_count_;
+  lower.surface_ = surface_;
+  for (std::size_t e = 0; e < elements_.size(); ++e) {
+    const auto& c = elements_[e].corners();
+    Polygon polygon(c.begin(), c.begin() + (elements_[e].is_triangle() ? 3 : 4));
+    lower.elements_.emplace_back(polygon, degree);
+  }
+  const std::vector<Index> kept = unknowns_of_degree(degree);
+  lower.number_unknowns();
+  lower.factors_.exchange_area_m2 = kernel()(kept, kept);
+  return lower;
+}
+
+Eigen::VectorXd GalerkinSystem::project(const Function& function) const {
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(unknowns());
+  const int points = options_.degree + 4;
+  const GaussRule& rule = gauss_rule(points);
+  double phi[kMaxFunctions];
+  for (std::size_t e = 0; e < elements_.size(); ++e)
+    for (int l = 0; l < points; ++l)
+      for (int k = 0; k < points; ++k) {
+        const double u = rule.nodes[l], v = rule.nodes[k];
+        elements_[e].evaluate(u, v, phi);
+        const double w = rule.weights[l] * rule.weights[k] * elements_[e].jacobian_m2(u) *
+                         function(surface_[e], elements_[e].at(u, v));
+        for (int f = 0; f < elements_[e].functions(); ++f) result[first_[e] + f] += w * phi[f];
+      }
+  return result;
+}
+
+BandMatrix GalerkinSystem::project_constants(const BandMatrix& exitance) const {
+  BandMatrix source = BandMatrix::Zero(unknowns(), exitance.cols());
+  for (std::size_t e = 0; e < elements_.size(); ++e)
+    source.row(first_[e]) =
+        std::sqrt(elements_[e].area_m2()) * exitance.row(static_cast<Index>(surface_[e]));
+  return source;
+}
+
+SolveSummary GalerkinSystem::solve(const BandMatrix& reflectance, const BandMatrix& source,
+                                   BandMatrix& coefficients) const {
+  BandMatrix rho(unknowns(), reflectance.cols());
+  for (std::size_t e = 0; e < elements_.size(); ++e)
+    for (Index f = first_[e]; f < first_[e + 1]; ++f)
+      rho.row(f) = reflectance.row(static_cast<Index>(surface_[e]));
+  SolveOptions options;
+  options.relative_bound = options_.relative_bound;
+  options.share_bands = false;  // what it saves is little beside the moments
+  return solve_radiosity(factors_, rho, source, options, coefficients);
+}
+
+double GalerkinSystem::distance_to(const Eigen::VectorXd& coefficients,
+                                   const Function& function) const {
+  const int points = options_.degree + 4;
+  const GaussRule& rule = gauss_rule(points);
+  double phi[kMaxFunctions], sum = 0.0;
+  for (std::size_t e = 0; e < elements_.size(); ++e)
+    for (int l = 0; l < points; ++l)
+      for (int k = 0; k < points; ++k) {
+        const double u = rule.nodes[l], v = rule.nodes[k];
+        elements_[e].evaluate(u, v, phi);
+        double difference = -function(surface_[e], elements_[e].at(u, v));
+        for (int f = 0; f < elements_[e].functions(); ++f)
+          difference += phi[f] * coefficients[first_[e] + f];
+        sum += rule.weights[l] * rule.weights[k] * elements_[e].jacobian_m2(u) * difference *
+               difference;
+      }
+  return std::sqrt(sum);
+}
+
+BandMatrix GalerkinSystem::surface_means(const BandMatrix& coefficients) const {
+  const auto n = static_cast<Index>(surface_count_);
+  BandMatrix sum = BandMatrix::Zero(n, coefficients.cols());
+  Eigen::VectorXd area = Eigen::VectorXd::Zero(n);
+  for (std::size_t e = 0; e < elements_.size(); ++e) {
+    const auto s = static_cast<Index>(surface_[e]);
+    sum.row(s) += std::sqrt(elements_[e].area_m2()) * coefficients.row(first_[e]);
+    area[s] += elements_[e].area_m2();
+  }
+  for (Index s = 0; s < n; ++s)
+    if (area[s] > 0.0) sum.row(s) /= area[s];
+  return sum;
+}
+
+Eigen::MatrixXd GalerkinSystem::gathered(std::size_t e, const std::vector<Vec3>& points,
+                                         const Eigen::MatrixXd& coefficients) const {
+  Eigen::MatrixXd sum =
+      Eigen::MatrixXd::Zero(static_cast<Index>(points.size()), coefficients.cols());
+  Eigen::VectorXd moments;
+  for (std::size_t j = 0; j < elements_.size(); ++j) {
+    if (!sees(elements_[e], elements_[j]) || !sees(elements_[j], elements_[e])) continue;
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      moments.setZero(elements_[j].functions());
+      add_gathered_moments(points[p], elements_[e].normal(), elements_[j],
+                           options_.relative_tolerance, moments.data());
+      sum.row(static_cast<Index>(p)).noalias() +=
+          moments.transpose() * coefficients.middleRows(first_[j], moments.size());
+    }
+  }
+  return sum;
+}
+
+BandMatrix GalerkinSystem::mean_error_bound(const BandMatrix& reflectance,
+                                            const BandMatrix& exitance,
+                                            const BandMatrix& coefficients) const {
+  const Index n = static_cast<Index>(surface_count_), bands = coefficients.cols();
+  Eigen::VectorXd area = Eigen::VectorXd::Zero(n);
+  for (std::size_t e = 0; e < elements_.size(); ++e)
+    area[static_cast<Index>(surface_[e])] += elements_[e].area_m2();
+  BandMatrix bound = BandMatrix::Zero(n, bands);
+  for (Index band = 0; band < bands; ++band) {
+    // Column 0: radiosity. Column 1 + s: the solution for the mean of surface s.
+    const BandMatrix rho = reflectance.col(band).replicate(1, n + 1);
+    BandMatrix source = BandMatrix::Zero(n, n + 1);  // rho times the right-hand side of A z = ...
+    source.col(0) = exitance.col(band);
+    for (Index s = 0; s < n; ++s)
+      if (area[s] > 0.0) source(s, s + 1) = rho(s, 0) / area[s];
+    BandMatrix solved;
+    solve(rho, project_constants(source), solved);
+    solved.col(0) = coefficients.col(band);
+
+    Eigen::MatrixXd products = Eigen::MatrixXd::Zero(n + 1, n + 2);  // <s_a, s_b>; <z_a, s_0>
+    std::vector<Eigen::MatrixXd> part(elements_.size(), products);
+    tbb::parallel_for(std::size_t{0}, elements_.size(), [&](std::size_t e) {
+      const double reflected = rho(static_cast<Index>(surface_[e]), 0);
+      if (reflected == 0.0) return;  // B = M there, and so is B~
+      const GaussRule& rule = gauss_rule(kResidualPoints);
+      std::vector<Vec3> points;
+      std::vector<double> weights;
+      Eigen::MatrixXd phi(elements_[e].functions(), kResidualPoints * kResidualPoints);
+      const auto crowd = [](double t) { return t * t * (3.0 - 2.0 * t); };
+      for (int l = 0; l < kResidualPoints; ++l)
+        for (int k = 0; k < kResidualPoints; ++k) {
+          const double s = rule.nodes[l], t = rule.nodes[k], u = crowd(s), v = crowd(t);
+          elements_[e].evaluate(u, v, phi.col(static_cast<Index>(points.size())).data());
+          weights.push_back(rule.weights[l] * rule.weights[k] * 36.0 * s * (1 - s) * t * (1 - t) *
+                            elements_[e].jacobian_m2(u));
+          points.push_back(elements_[e].at(u, v));
+        }
+      const Eigen::MatrixXd in = gathered(e, points, solved);
+      const Eigen::MatrixXd own = phi.transpose() * solved.middleRows(first_[e], phi.rows());
+      for (Index p = 0; p < in.rows(); ++p) {
+        const Eigen::RowVectorXd s = source.row(static_cast<Index>(surface_[e])) / reflected +
+                                     in.row(p) - own.row(p) / reflected;
+        const double w = weights[static_cast<std::size_t>(p)];
+        part[e].leftCols(n + 1).diagonal() += w * s.transpose().cwiseAbs2();
+        part[e].col(n + 1) += w * s[0] * own.row(p).transpose();
+      }
+    });
+    for (const Eigen::MatrixXd& p : part) products += p;
+    const double gap = 1.0 / reflectance.col(band).maxCoeff() - 1.0;
+    for (Index s = 0; s < n; ++s)
+      bound(s, band) = std::abs(products(s + 1, n + 1)) +
+                       std::sqrt(products(0, 0) * products(s + 1, s + 1)) / gap;
+  }
+  return bound;
+}
+
+}  // namespace truebox

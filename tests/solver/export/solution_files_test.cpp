@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "export/solution_files.h"
+
+#include <gmock/gmock.h>
+
+#include <set>
+
+#include "export/solution_surface.h"
+#include "solver/export/glb_reader.h"
+#include "support/tiny_scenes.h"
+
+namespace truebox {
+namespace {
+
+Observer observer() {
+  return read_observer(std::string(TRUEBOX_REFERENCE_DIR) + "/colour/cie1931_2deg_xyz.csv",
+                       "CIE 1931 2 deg");
+}
+
+Prediction solved(const Scene& scene, std::size_t elements) {
+  PredictOptions options;
+  options.elements = elements;
+  return {scene, options};
+}
+
+// Closed, rho = 1/2, E = 1 everywhere: B = 2. All grids agree on it, so the bound is next to
+// nothing; what is left is the quadrature of view factors, which closes rows to about 1e-8.
+TEST(SolutionSurface, OfAFurnaceIsTwoWithinItsBound) {
+  const Scene scene = tiny::cube(1.0, 0.5, 1.0);
+  const Prediction prediction = solved(scene, 600);
+  const SolutionSurface surface = solution_surface(prediction);
+  ASSERT_EQ(surface.radiosity.rows(), static_cast<Eigen::Index>(surface.positions_m.size()));
+  for (Eigen::Index v = 0; v < surface.radiosity.rows(); ++v)
+    EXPECT_NEAR(surface.radiosity(v, 0), 2.0, surface.error_bound(v, 0) + 1e-7);
+  double area_m2 = 0.0;
+  for (std::size_t t = 0; t < surface.triangles.size(); t += 3) {
+    const auto at = [&](std::size_t k) { return surface.positions_m[surface.triangles[t + k]]; };
+    area_m2 += 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
+  }
+  EXPECT_NEAR(area_m2, 6.0, 1e-12);
+  // Continuous on every face: no vertex of a face stands twice in one place.
+  std::set<std::tuple<std::uint32_t, double, double, double>> places;
+  std::set<std::uint32_t> vertices;
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+    const std::uint32_t v = surface.triangles[t];
+    const Vec3& p = surface.positions_m[v];
+    if (vertices.insert(v).second) {
+      EXPECT_TRUE(places.insert({surface.surface[t / 3], p.x(), p.y(), p.z()}).second);
+    }
+  }
+}
+
+// Under a block nothing is drawn; along its foot the floor has two values, lit and dark.
+TEST(SolutionSurface, LeavesOutWhatLiesUnderABlock) {
+  const Scene scene = tiny::cube_with_block(1.0, 0.5, 1.0);
+  const SolutionSurface surface = solution_surface(solved(scene, 900));
+  double floor_m2 = 0.0;
+  for (std::size_t t = 0; t < surface.surface.size(); ++t) {
+    if (surface.surface[t] != 0) continue;
+    const auto at = [&](std::size_t k) {
+      return surface.positions_m[surface.triangles[3 * t + k]];
+    };
+    floor_m2 += 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
+  }
+  EXPECT_NEAR(floor_m2, 1.0 - 0.27 * 0.29, 1e-9);
+}
+
+TEST(SolutionGlb, HoldsTheSurfaceAndKeepsTheSpecification) {
+  const Scene scene = tiny::cube(1.0, 0.5, 1.0);
+  const Prediction prediction = solved(scene, 200);
+  const Glb glb = read_glb(solution_glb(prediction, observer()));
+  EXPECT_EQ(glb.json["meshes"].size(), 6u);
+  std::size_t vertices = 0;
+  for (const auto& mesh : glb.json["meshes"]) {
+    const auto& attributes = mesh["primitives"][0]["attributes"];
+    for (const float b : glb.floats(attributes["_RADIOSITY_550_000NM"]))
+      EXPECT_NEAR(b, 2.0f, 2e-2f);
+    for (const float c : glb.floats(attributes["COLOR_0"])) EXPECT_TRUE(c >= 0.0f && c <= 1.0f);
+    EXPECT_EQ(attributes.count("_ERROR_BOUND_550_000NM"), 1u);
+    vertices += glb.floats(attributes["POSITION"]).size() / 3;
+  }
+  EXPECT_EQ(vertices, solution_surface(prediction).positions_m.size());
+  EXPECT_EQ(glb.json["extensionsUsed"][0], "KHR_materials_unlit");
+}
+
+}  // namespace
+}  // namespace truebox
