@@ -73,7 +73,7 @@ PictureAgreement picture_agreement(const UncertainPicture& test, const Uncertain
   PictureAgreement result;
   result.p_values = b.radiance;
   result.p_values.attributes = {{"unit", "1"}};
-  double sum = 0.0, squares = 0.0;
+  double sum = 0.0, squares = 0.0, bounds = 0.0;
   std::size_t beyond = 0;
   for (std::size_t c = 0; c < b.radiance.channels.size(); ++c) {
     double differences = 0.0, variance = 0.0, light = 0.0;
@@ -98,6 +98,7 @@ PictureAgreement picture_agreement(const UncertainPicture& test, const Uncertain
       ++result.tests;
       sum += score;
       squares += score * score;
+      if (u > 0.0) bounds += bound * bound / (u * u);
       beyond += std::abs(score) > 3.0;
       differences += difference;
       variance += u * u;
@@ -114,6 +115,7 @@ PictureAgreement picture_agreement(const UncertainPicture& test, const Uncertain
   result.family_wise_p = family_wise_p(result.smallest_p, result.tests);
   result.mean_score = sum / n;
   result.rms_score = std::sqrt(squares / n);
+  result.rms_bound = std::sqrt(bounds / n);
   result.share_beyond_3 = static_cast<double>(beyond) / n;
   return result;
 }

@@ -29,6 +29,8 @@ struct PictureAgreement {
   // nothing but noise is between them.
   double mean_score = 0.0;
   double rms_score = 0.0;
+  double rms_bound =
+      0.0;  ///< of bounds / standard errors: errors this large spread to hypot(1, that)
   double share_beyond_3 = 0.0;  ///< 0.27 % of a normal distribution
   /// Sum of all differences of a band over its standard error, the band where it is largest, and
   /// that sum over the reference's. What skewed noise of single pixels does to `mean_score` (a
