@@ -71,7 +71,7 @@ position = [0.5, -1, 0.5]
 direction = [0, 1, 0]
 up = [0, 0, 1]
 focal_length_mm = 35
-film_mm = [25, 25]
+film_mm = [24, 18]
 pixels = [16, 12]
 )";
 

@@ -33,11 +33,12 @@ TEST_P(CertifiedValues, AreReproducedInDigits) {
               fewest);
 }
 
-// Fewest digits: the furnace at rho = 1 - 1e-6 amplifies rounding by 1e6 twice over; plates with
+// Fewest digits: view factors past a blocker are asked for six, the others for nine, by what each
+// check allows; the furnace at rho = 1 - 1e-6 amplifies rounding by 1e6 twice over; plates with
 // gap 1e-8 lose 2e-8 of their view, amplified by 1 / (1 - rho); probes carry Monte Carlo noise;
 // in the tip of a narrow bright wedge B rises like x^0.3, and the shortest element decides.
 INSTANTIATE_TEST_SUITE_P(Groups, CertifiedValues,
-                         testing::Values(Group{"viewfactors", check_view_factors, 20, 9.0},
+                         testing::Values(Group{"viewfactors", check_view_factors, 20, 6.0},
                                          Group{"furnace", check_furnace, 10, 9.0},
                                          Group{"plates", check_infinite_plates, 6, 5.0},
                                          Group{"bases", check_strips, 136, 5.0},
