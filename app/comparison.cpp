@@ -8,6 +8,7 @@
 
 #include "commands.h"
 #include "difference/spectral_angle.h"
+#include "image/channel_map.h"
 #include "image/image_file.h"
 #include "image/spectral_image.h"
 #include "radiometry/input_error.h"
@@ -20,6 +21,11 @@ namespace {
 struct Uncertainties {
   std::optional<Image> test, reference, bound, mask;
 };
+
+Image read_mapped(const std::string& path, const std::string& channels) {
+  Image image = read_image(path);
+  return channels.empty() ? image : map_channels(image, channels);
+}
 
 std::optional<Image> read_if(const std::string& path) {
   if (path.empty()) return std::nullopt;
@@ -171,7 +177,8 @@ std::vector<Limit> limits_of(const ComparisonArguments& a) {
 }  // namespace
 
 Comparison compare(const ComparisonArguments& a) {
-  const Image test = read_image(a.test), reference = read_image(a.reference);
+  const Image test = read_mapped(a.test, a.test_channels);
+  const Image reference = read_mapped(a.reference, a.reference_channels);
   const Uncertainties uncertainties = read_uncertainties(a);
   Comparison c;
   c.map = make_map(a, uncertainties, test, reference);

@@ -23,6 +23,7 @@ namespace truebox::app {
 /// What `compare` is asked; a suite file asks the same for each of its entries.
 struct ComparisonArguments {
   std::string test, reference;
+  std::string test_channels, reference_channels;  ///< maps, see image/channel_map.h
   std::optional<double> warn, fail;
   double outliers = 0.0;
   bool relative = false, percent = false, sigmas = false;

@@ -84,6 +84,13 @@ void add_uncertainty_options(CLI::App& command, ComparisonArguments& a) {
 
 void add_part_options(CLI::App& command, ComparisonArguments& a) {
   const char* group = "What is compared";
+  command
+      .add_option("--test-channels", a.test_channels,
+                  "channels of TEST by another program: NAME=CHANNEL[*FACTOR],...; {nm} stands for "
+                  "a wavelength, as in 'S0.{nm}nm=band_{nm}nm'")
+      ->group(group);
+  command.add_option("--reference-channels", a.reference_channels, "likewise of REFERENCE")
+      ->group(group);
   command.add_option("--band", a.band_nm, "compare only the band nearest to this wavelength, nm")
       ->group(group);
   command.add_option("--mask", a.mask, "image of one channel; pixels where it is 0 do not count")

@@ -141,6 +141,23 @@ TEST_F(Program, ExportsToEveryFormat) {
   EXPECT_FALSE(fs::exists(file("x")));
 }
 
+// A render as Mitsuba's film names it, in another unit: the map makes it the same image.
+TEST_F(Program, ComparesChannelsByAMap) {
+  Image ours(3, 2), theirs(3, 2);
+  ours.add_channel("S0.450,000000nm", 2.0f);
+  ours.add_channel("S0.550,000000nm", 3.0f);
+  theirs.add_channel("band_450_000nm", 200.0f);
+  theirs.add_channel("band_550_000nm", 300.0f);
+  write_exr(file("ours.exr"), ours);
+  write_exr(file("theirs.exr"), theirs);
+  const std::string images = "compare " + file("theirs.exr") + " " + file("ours.exr");
+  EXPECT_EQ(run(images).code, 3);
+  const Outcome mapped = run(images + " --fail 1e-6 --test-channels 'S0.{nm}nm=band_{nm}nm*0.01'");
+  EXPECT_EQ(mapped.code, 0) << mapped.text;
+  EXPECT_EQ(run(images + " --test-channels 'S0.450nm=Z'").code, 3);
+  EXPECT_EQ(run(images + " --test-channels nonsense").code, 4);
+}
+
 TEST_F(Program, SolvesIntoEveryKindOfFile) {
   for (const char* name : {"s.json", "s.vtu", "s.glb", "s.html"}) {
     const Outcome done = run("solve " + room() + " --elements 100 -o " + file(name));
