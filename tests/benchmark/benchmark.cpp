@@ -53,7 +53,9 @@ nlohmann::json as_json(const Kernels& k) {
           {"form_factor_pairs_unoccluded_per_s", k.pairs_unoccluded_per_s},
           {"band_product_flop_per_s", k.product_flop_per_s},
           {"band_product_one_band_bytes_per_s", k.product_one_band_bytes_per_s},
-          {"all_bands_to_one_band_time", k.bands_time_ratio}};
+          {"all_bands_to_one_band_time", k.bands_time_ratio},
+          {"solve_all_bands_to_one_band_time", k.solve_time_ratio},
+          {"bands_reduced", k.bands_reduced}};
 }
 
 nlohmann::json as_json(const SolverWork& w) {
@@ -91,6 +93,8 @@ void print(const Kernels& k) {
   line("matrix times one band, matrix read", 1e-9 * k.product_one_band_bytes_per_s, "GB/s");
   line("  share of the triad", 100.0 * k.product_one_band_bytes_per_s / k.triad_bytes_per_s, "%");
   line("time of all bands : time of one", k.bands_time_ratio, "");
+  line("  the same of a whole solve, bands shared", k.solve_time_ratio, "");
+  line("  bands found on the basis of the others", k.bands_reduced, "");
 }
 
 // Path tracing's error falls like n^-1/2: what it takes to reach the error of each radiosity

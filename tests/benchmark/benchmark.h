@@ -69,6 +69,8 @@ struct Kernels {
   double product_flop_per_s = 0.0;       ///< S times all bands
   double product_one_band_bytes_per_s = 0.0;  ///< S times one band: S is read once
   double bands_time_ratio = 0.0;              ///< time of all bands : time of one
+  double solve_time_ratio = 0.0;              ///< the same of a whole solve, bands shared
+  int bands_reduced = 0;                      ///< of that solve, found on the basis of the others
 };
 Kernels measure_kernels(const Scene& scene, std::size_t elements);
 

@@ -89,10 +89,21 @@ Kernels measure_kernels(const Scene& scene, std::size_t elements) {
       0.5 * n * (n - 1.0) /
       best_seconds([&] { form_factors(box.mesh, scene, visibility, options); }, 2);
   const Eigen::MatrixXd& s = box.factors.exchange_area_m2;
-  const BandMatrix one = box.source.leftCols(1);
+  const BandMatrix one = box.source.rightCols(1);
   double sum = 0.0;
   const double all_s = best_seconds([&] { sum += band_product(s, box.source)(0, 0); });
   const double one_s = best_seconds([&] { sum += band_product(s, one)(0, 0); });
+  BandMatrix radiosity;
+  const BandMatrix one_rho = box.rho.rightCols(1);
+  SolveOptions each;
+  each.share_bands = false;
+  const double solve_all_s = best_seconds([&] {
+    const auto summary = solve_radiosity(box.factors, box.rho, box.source, {}, radiosity);
+    result.bands_reduced = summary.bands_reduced;
+  });
+  const double solve_one_s =
+      best_seconds([&] { solve_radiosity(box.factors, one_rho, one, each, radiosity); });
+  result.solve_time_ratio = solve_all_s / solve_one_s;
   if (!(sum >= 0.0)) return {};  // keeps the products from being optimised away
   result.product_flop_per_s = 2.0 * n * n * static_cast<double>(result.bands) / all_s;
   result.product_one_band_bytes_per_s = n * n * sizeof(double) / one_s;
