@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "document/report.h"
 
+#include <utility>
+
 #include "document/writers.h"
 #include "image/image_file.h"
 
@@ -19,13 +21,25 @@ int exit_code(Agreement outcome) {
 }
 
 void write_report(const std::filesystem::path& directory, const Report& report) {
-  write_file_atomically(directory / "report.html", to_html(report));
-  write_file_atomically(directory / "report.json", to_json(report));
-  write_file_atomically(directory / "junit.xml",
-                        to_junit(report, {(directory / "report.html").generic_string()}));
-  write_file_atomically(directory / "summary.md", to_markdown(report));
-  write_file_atomically(directory / "badge.json", to_badge(report));
-  write_file_atomically(directory / "metrics.txt", to_openmetrics(report));
+  const std::pair<const char*, std::string> files[] = {
+      {"report.html", to_html(report)},
+      {"report.json", to_json(report)},
+      {"junit.xml", to_junit(report, {(directory / "report.html").generic_string()})},
+      {"summary.md", to_markdown(report)},
+      {"badge.json", to_badge(report)},
+      {"metrics.txt", to_openmetrics(report)}};
+  // A disk that fills half way must not leave a new page beside old numbers: all are written
+  // before any takes its name.
+  const auto unnamed = [&](const char* name) { return directory / (std::string(name) + ".new"); };
+  try {
+    for (const auto& [name, text] : files) write_file_atomically(unnamed(name), text);
+  } catch (...) {
+    std::error_code ignored;
+    for (const auto& file : files) std::filesystem::remove(unnamed(file.first), ignored);
+    throw;
+  }
+  for (const auto& file : files)
+    std::filesystem::rename(unnamed(file.first), directory / file.first);
 }
 
 }  // namespace truebox

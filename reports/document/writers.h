@@ -48,7 +48,7 @@ std::string to_openmetrics(const Report& report);
 void add_trend(Report& report, const Report& baseline);
 
 /// Writes report.html, report.json, junit.xml, summary.md, badge.json and metrics.txt
-/// (OpenMetrics), each complete or not at all. The failures in junit.xml name the page.
+/// (OpenMetrics), all of them complete or none. The failures in junit.xml name the page.
 void write_report(const std::filesystem::path& directory, const Report& report);
 
 }  // namespace truebox

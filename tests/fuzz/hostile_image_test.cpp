@@ -9,6 +9,7 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "document/writers.h"
 #include "image/image_file.h"
 #include "radiometry/input_error.h"
 #include "support/scratch.h"
@@ -104,6 +105,33 @@ class FullDisk {
   rlimit before_{};
   void (*handler_)(int) = nullptr;
 };
+
+TEST(FullDisk, LeavesTheWholeOldReport) {
+  const auto folder = std::filesystem::path(scratch_path("full_disk_report"));
+  const auto text_of = [&](const char* name) {
+    std::ifstream file(folder / name);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  Report report;
+  report.title = "old";
+  // JSON takes two bytes for such a character: the numbers outgrow the page beside them.
+  report.checks = {{std::string(60000, '\\'), Agreement::agrees, 1.0, 2.0, "1", ""}};
+  write_report(folder, report);
+  const std::size_t files =
+      static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder), {}));
+  const std::string page = text_of("report.html"), numbers = text_of("report.json");
+  report.title = "new";
+  ASSERT_GT(numbers.size(), page.size() + 1000) << "the page, which comes first, must fit";
+  {
+    const FullDisk full(static_cast<rlim_t>(page.size() + 500));
+    EXPECT_THROW(write_report(folder, report), std::runtime_error);
+  }
+  EXPECT_TRUE(text_of("report.html") == page) << "a new page beside old numbers";
+  EXPECT_TRUE(text_of("report.json") == numbers);
+  EXPECT_EQ(
+      static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder), {})),
+      files);
+}
 
 TEST(FullDisk, LeavesTheOldFileAndNoOther) {
   const auto folder = std::filesystem::path(scratch_path("full_disk"));
