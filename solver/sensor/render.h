@@ -12,7 +12,7 @@ namespace truebox {
 struct RenderOptions {
   int samples = 16;           ///< points of a pixel in which the radiance is even
   int edge_samples = 256;     ///< of one that an edge, a shadow's edge or a corner crosses
-  double even_within = 2e-3;  ///< sampling bound / radiance up to which a pixel counts as even
+  double even_within = 2e-2;  ///< sampling bound / radiance up to which a pixel counts as even
   PixelFilter filter = PixelFilter::box;
   /// Pixels whose bound is above this share of their radiance gather their indirect light once
   /// more, by exact visibility (final gather): slow, and better close to edges. Infinite: none
