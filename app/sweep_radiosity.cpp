@@ -8,6 +8,7 @@
 
 #include "prediction_options.h"
 #include "radiometry/input_error.h"
+#include "scene/requirements.h"
 #include "sweep.h"
 #include "transport/solve_radiosity.h"
 
@@ -77,6 +78,7 @@ SweepPoint measure(const System& system, const BandMatrix& truth, const SolveOpt
 }  // namespace
 
 Sweep sweep_radiosity(const Scene& scene, const SweepArguments& a) {
+  require_lambertian(scene);
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   const auto progress = terminal_progress(a.quiet);
   const System system = system_of(scene, progress);

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "image/image_file.h"
 #include "image/spectral_image.h"
@@ -415,15 +416,64 @@ TEST_F(Program, RadiosityRefusesAMirrorAndPathsTraceIt) {
   EXPECT_EQ(plan.code, 0);
   EXPECT_THAT(plan.text, HasSubstr("path tracing: needed, surface \"floor\" is a mirror"));
   EXPECT_TRUE(nlohmann::json::parse(text_of(file("plan.json")))["path_tracing"].get<bool>());
-  for (const std::string& arguments :
-       {"solve " + scene, "render " + scene + " -o " + file("x.exr")}) {
+  for (const std::string& arguments : {"solve " + scene, "render " + scene + " -o " + file("x.exr"),
+                                       "sweep " + scene + " --of radiosity"}) {
     const Outcome refused = run(arguments);
     EXPECT_EQ(refused.code, 4) << arguments;
     EXPECT_THAT(refused.text, HasSubstr("expected Lambertian surfaces only"));
     EXPECT_THAT(refused.text, HasSubstr("--method path"));
   }
   EXPECT_FALSE(fs::exists(file("x.exr")));
+  for (const std::string to : {"mitsuba", "pbrt", "radiance", "obj", "gltf"})
+    EXPECT_EQ(run("export " + scene + " --to " + to + " -o " + file(to)).code, 4) << to;
   EXPECT_EQ(run("render " + scene + " --method path --samples 16 -o " + file("x.exr")).code, 0);
+}
+
+TEST_F(Program, SweepsTheSolversAndEveryBoundHolds) {
+  const Outcome swept = run("sweep " + room() + " --of radiosity --json " + file("s.json") +
+                            " --plot " + file("s.svg"));
+  ASSERT_EQ(swept.code, 0) << swept.text;
+  const auto json = nlohmann::json::parse(text_of(file("s.json")));
+  std::set<std::string> methods;
+  for (const auto& point : json.at("points")) {
+    methods.insert(point.at("method").get<std::string>());
+    EXPECT_EQ(point.at("bound_held").get<double>(), 1.0) << point.dump();
+  }
+  EXPECT_EQ(methods.size(), 9u) << "eight methods, one of them with shared bands too";
+  EXPECT_THAT(text_of(file("s.svg")), HasSubstr("<svg"));
+}
+
+TEST_F(Program, ProbesMeansOverAreas) {
+  const std::string header =
+      "# quantity: areas\n# unit: m\n# source: made up\n"
+      "name,ox,oy,oz,ux,uy,uz,vx,vy,vz\n";
+  const Outcome good = run("probe " + room() + " --elements 200 --areas " +
+                           write("areas.csv", header + "a,0.1,0.1,0,0.2,0,0,0,0.2,0\n") + " -o " +
+                           file("means.csv"));
+  EXPECT_EQ(good.code, 0) << good.text;
+  EXPECT_THAT(text_of(file("means.csv")), HasSubstr("\"a\","));
+  const Outcome flat = run("probe " + room() + " --elements 200 --areas " +
+                           write("flat.csv", header + "a,0.1,0.1,0,0.2,0,0,0.4,0,0\n"));
+  EXPECT_EQ(flat.code, 4);
+  EXPECT_THAT(flat.text, HasSubstr("flat.csv:5"));
+  const Outcome air = run("probe " + room() + " --elements 200 --areas " +
+                          write("air.csv", header + "up,0.1,0.1,0.33,0.2,0,0,0,0.2,0\n"));
+  EXPECT_EQ(air.code, 4);
+  EXPECT_THAT(air.text, HasSubstr("touches none"));
+  EXPECT_EQ(run("probe " + room()).code, 64) << "neither points nor areas";
+}
+
+TEST_F(Program, SolvesToATargetError) {
+  const Outcome found =
+      run("solve " + room() + " --target-error 5% --sensitivities -o " + file("t.json"));
+  ASSERT_EQ(found.code, 0) << found.text;
+  EXPECT_THAT(found.text, HasSubstr("means of surfaces bound to"));
+  const auto json = nlohmann::json::parse(text_of(file("t.json")));
+  EXPECT_LE(json.at("largest_relative_bound_of_a_surface").get<double>(), 0.05);
+  EXPECT_FALSE(json.at("target_missed").get<bool>());
+  EXPECT_TRUE(json.at("surfaces").at(0).contains("radiosity_by_reflectance"));
+  EXPECT_EQ(run("solve " + room() + " --target-error 0").code, 64);
+  EXPECT_EQ(run("solve " + room() + " --target-error half").code, 64);
 }
 
 TEST_F(Program, OptionsOfTheOtherMethodAreWrongUsage) {
