@@ -91,8 +91,8 @@ void add_validate_command(CLI::App& program, Action& chosen) {
   auto arguments = std::make_shared<ValidateArguments>();
   auto* only =
       command->add_option("--only", arguments->only, "one group; render runs only when named")
-          ->check(CLI::IsMember(
-              {"viewfactors", "furnace", "plates", "bases", "cube", "cie171", "cornellbox", kRender}));
+          ->check(CLI::IsMember({"viewfactors", "furnace", "plates", "bases", "cube", "cie171",
+                                 "cornellbox", kRender}));
   command->add_option("--elements", arguments->elements, "elements of the Cornell Box")
       ->capture_default_str();
   command->add_option("--json", arguments->json, "every check as JSON");

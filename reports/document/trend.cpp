@@ -33,8 +33,10 @@ Figure trend_figure(const std::vector<Check>& checks) {
     return share_of_limit(*a, a->measured) > share_of_limit(*b, b->measured);
   });
   if (shown.size() > kMostLines) shown.resize(kMostLines);
-  LinePlot plot{
-      "Measured over limit, run by run", {"runs before this one", ""}, {"measured / limit", ""}, {}};
+  LinePlot plot{"Measured over limit, run by run",
+                {"runs before this one", ""},
+                {"measured / limit", ""},
+                {}};
   for (const Check* check : shown) {
     PlotSeries series{check->name, {}, {}};
     const auto n = static_cast<double>(check->earlier.size());

@@ -37,8 +37,8 @@ class TabulatedSpectrum {
   std::vector<double> values_;
 };
 
-/// The value in each band: the point value at the centre where the table is as coarse as the band (a
-/// sample is then a band value already), else the mean: lines between coarse samples count.
+/// The value in each band: the point value at the centre where the table is as coarse as the band
+/// (a sample is then a band value already), else the mean: lines between coarse samples count.
 std::vector<double> sample_bands(const TabulatedSpectrum& spectrum, const WavelengthGrid& grid);
 
 }  // namespace truebox

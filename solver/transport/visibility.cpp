@@ -74,8 +74,8 @@ bool Visibility::occluded(const Vec3& from, const Vec3& from_normal, const Vec3&
 std::optional<Visibility::Hit> Visibility::first_hit(const Vec3& origin, const Vec3& direction,
                                                      bool with_openings) const {
   const Implementation& self = *implementation_;
-  const auto met = self.rays->first_hit(
-      origin, direction, with_openings ? kSurfaceMask | kOpeningMask : kSurfaceMask);
+  const auto met = self.rays->first_hit(origin, direction,
+                                        with_openings ? kSurfaceMask | kOpeningMask : kSurfaceMask);
   if (!met) return std::nullopt;
   Hit hit;
   hit.piece = self.piece_of[met->group][met->triangle];
