@@ -3,6 +3,7 @@
 // (KHR_materials_emissive_strength): 683 lm/W times integral(L xbar..zbar). Where the colours carry
 // bands, emission is their spectral radiance instead. No gloss: KHR_materials_specular 0.
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 
@@ -16,8 +17,22 @@ namespace {
 GltfMaterial material_of(const Scene& scene, const Surface& surface, const Colours& colours,
                          std::vector<std::string>& notes) {
   const Material& material = scene.material_of(surface);
-  GltfMaterial written{material.name, colours.reflectance(material, notes),
+  const bool is_clear = material.scattering == Scattering::dielectric;
+  GltfMaterial written{material.name,
+                       is_clear ? LinearRgb{1.0, 1.0, 1.0} : colours.reflectance(material, notes),
                        colours.radiance(material), surface.two_sided};
+  if (is_clear) {
+    written.refractive_index = middle_index(material);
+    written.roughness = 0.0;
+  } else if (material.scattering != Scattering::lambertian) {
+    written.metallic = 1.0;
+    written.roughness = std::sqrt(material.roughness);
+  }
+  if (material.scattering != Scattering::lambertian)
+    notes.push_back("Material \"" + material.name +
+                    "\" follows glTF's rules: Schlick's reflectance instead of Fresnel's (a mirror "
+                    "grows brighter at grazing angles), one refractive index, that of the middle "
+                    "band.");
   const double efficacy = colours.by_bands() ? 1.0 : 683.0;
   for (double& e : written.emission) e = std::max(0.0, efficacy * e);
   return written;

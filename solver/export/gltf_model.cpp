@@ -49,23 +49,31 @@ json material_json(const GltfMaterial& m, std::set<std::string>& extensions) {
                    {"doubleSided", m.two_sided},
                    {"pbrMetallicRoughness",
                     {{"baseColorFactor", {m.base_colour[0], m.base_colour[1], m.base_colour[2], 1}},
-                     {"metallicFactor", 0},
-                     {"roughnessFactor", 1}}}};
+                     {"metallicFactor", m.metallic},
+                     {"roughnessFactor", m.roughness}}}};
   if (m.unlit) {
     material["extensions"]["KHR_materials_unlit"] = json::object();
     extensions.insert("KHR_materials_unlit");
     return material;
   }
-  // glTF's default dielectric has a Fresnel highlight; Lambertian surfaces have none.
-  material["extensions"]["KHR_materials_specular"] = {{"specularFactor", 0}};
-  extensions.insert("KHR_materials_specular");
+  const auto extend = [&](const char* name, const json& value) {
+    material["extensions"][name] = value;
+    extensions.insert(name);
+  };
+  if (m.refractive_index > 0.0) {
+    extend("KHR_materials_ior", {{"ior", m.refractive_index}});
+    extend("KHR_materials_transmission", {{"transmissionFactor", 1}});
+    extend("KHR_materials_volume", {{"thicknessFactor", 1}});  // any: without one it is a thin wall
+  } else if (m.metallic == 0.0) {
+    // glTF's default dielectric has a Fresnel highlight; Lambertian surfaces have none.
+    extend("KHR_materials_specular", {{"specularFactor", 0}});
+  }
   const double strength = *std::max_element(m.emission.begin(), m.emission.end());
   if (strength > 0.0) {
     json factor = json::array();
     for (const double e : m.emission) factor.push_back(std::clamp(e / strength, 0.0, 1.0));
     material["emissiveFactor"] = factor;
-    material["extensions"]["KHR_materials_emissive_strength"] = {{"emissiveStrength", strength}};
-    extensions.insert("KHR_materials_emissive_strength");
+    extend("KHR_materials_emissive_strength", {{"emissiveStrength", strength}});
   }
   return material;
 }

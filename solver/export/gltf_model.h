@@ -31,6 +31,9 @@ struct GltfMaterial {
   std::array<double, 3> emission = {0.0, 0.0, 0.0};  ///< any size: written as factor x strength
   bool two_sided = false;
   bool unlit = false;
+  double metallic = 0.0;          ///< 1: base colour is the reflectance along the normal
+  double roughness = 1.0;         ///< its square is GGX alpha
+  double refractive_index = 0.0;  ///< above 0: a clear dielectric with a volume behind it
 };
 
 /// Meshes in world coordinates, m; y need not be up. Extras are notes for a person.
@@ -46,7 +49,7 @@ struct GltfFile {
 };
 
 /// Source: glTF 2.0 specification (Khronos 2021), KHR_materials_unlit, _specular,
-/// _emissive_strength. `buffer_uri` is empty for the binary form.
+/// _emissive_strength, _transmission, _ior, _volume. `buffer_uri` is empty for the binary form.
 GltfFile gltf_file(const GltfModel& model, const std::string& buffer_uri);
 std::string glb_bytes(const GltfModel& model);
 

@@ -4,7 +4,9 @@
 //   <spectrum type="irregular"> is taken as it stands, so that is what is written;
 // - specfilm's channel j is integral(response_j(lambda) L(lambda) dlambda), not normalised: a
 //   response of 1/width in a band makes it the band's mean radiance;
-// - float16 unless told otherwise; `diffuse` and `area` act on the side of the normal only.
+// - float16 unless told otherwise; `diffuse`, `conductor` and `area` act on the side of the normal
+//   only; `conductor` without material or eta is an ideal mirror; `dielectric` takes one number for
+//   its index, and means air of 1.000277 outside unless told otherwise.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -84,17 +86,44 @@ std::string ply(const std::vector<Triangle>& triangles) {
   return text;
 }
 
+// Plugin and parameters. `roughconductor` has Fresnel's reflectance of eta + i k over GGX facets
+// with Smith's masking, as the scene's own.
+std::pair<const char*, std::string> scatterer(const Scene& scene, const Material& m) {
+  const auto of_bands = [&](const char* name, const std::vector<double>& values) {
+    const Steps steps = stepped(scene.bands, values);
+    return spectrum("    ", name, steps.nm, steps.value);
+  };
+  const auto constants = [&] {
+    return of_bands("eta", m.refractive_index.values) + of_bands("k", m.absorption_index.values);
+  };
+  switch (m.scattering) {
+    case Scattering::lambertian: break;
+    case Scattering::mirror:
+      if (!m.refractive_index.values.empty()) return {"conductor", constants()};
+      return {"conductor", of_bands("specular_reflectance", m.reflectance.values)};
+    case Scattering::rough_conductor:
+      return {"roughconductor", fmt::format("    <string name=\"distribution\" value=\"ggx\"/>\n"
+                                            "    <float name=\"alpha\" value=\"{:.9g}\"/>\n",
+                                            m.roughness) +
+                                    constants()};
+    case Scattering::dielectric:
+      return {"dielectric", fmt::format("    <float name=\"int_ior\" value=\"{:.9g}\"/>\n"
+                                        "    <float name=\"ext_ior\" value=\"1\"/>\n",
+                                        common_refractive_index(scene, m, "Mitsuba"))};
+  }
+  return {"diffuse", of_bands("reflectance", m.reflectance.values)};
+}
+
 std::string bsdf(const Scene& scene, std::size_t material, bool two_sided) {
   const Material& m = scene.materials[material];
-  const Steps rho = stepped(scene.bands, m.reflectance.values);
   const std::string id = safe_name(m.name, material);
-  const std::string reflectance = spectrum("    ", "reflectance", rho.nm, rho.value);
+  const auto [type, content] = scatterer(scene, m);
   if (!two_sided)
-    return fmt::format("  <bsdf type=\"diffuse\" id=\"{}\">\n{}  </bsdf>\n", id, reflectance);
+    return fmt::format("  <bsdf type=\"{}\" id=\"{}\">\n{}  </bsdf>\n", type, id, content);
   return fmt::format(
-      "  <bsdf type=\"twosided\" id=\"{}_two_sided\">\n    <bsdf type=\"diffuse\">\n{}    </bsdf>\n"
+      "  <bsdf type=\"twosided\" id=\"{}_two_sided\">\n    <bsdf type=\"{}\">\n{}    </bsdf>\n"
       "  </bsdf>\n",
-      id, reflectance);
+      id, type, content);
 }
 
 }  // namespace

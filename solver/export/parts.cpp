@@ -53,6 +53,36 @@ std::vector<double> emitted_radiance(const Material& material) {
   return radiance;
 }
 
+std::vector<double> normal_reflectance(const Material& material) {
+  if (material.refractive_index.values.empty()) return material.reflectance.values;
+  std::vector<double> reflectance;
+  for (std::size_t b = 0; b < material.refractive_index.values.size(); ++b) {
+    const double n = material.refractive_index[b];
+    const double k = material.absorption_index.values.empty() ? 0.0 : material.absorption_index[b];
+    reflectance.push_back(((n - 1.0) * (n - 1.0) + k * k) / ((n + 1.0) * (n + 1.0) + k * k));
+  }
+  return reflectance;
+}
+
+double middle_index(const Material& material) {
+  return material.refractive_index[material.refractive_index.values.size() / 2];
+}
+
+void refuse_material(const Scene& scene, const Material& material, const std::string& expected,
+                     const std::string& found) {
+  throw InputError(scene.path, 0, expected, "material \"" + material.name + "\": " + found);
+}
+
+double common_refractive_index(const Scene& scene, const Material& material, const char* program) {
+  const auto& n = material.refractive_index.values;
+  const auto [least, most] = std::minmax_element(n.begin(), n.end());
+  if (*most - *least > 1e-9 * *most)
+    refuse_material(scene, material,
+                    fmt::format("one refractive index for all bands ({} knows no other)", program),
+                    fmt::format("indices from {:g} to {:g}", *least, *most));
+  return *least;
+}
+
 Colours::Colours(const Scene& scene, const ExportOptions& options, RgbFromXyz rgb_from_xyz)
     : scene_(&scene),
       options_(&options),
@@ -88,9 +118,10 @@ LinearRgb Colours::rgb(const std::vector<double>& stimulus) const {
 }
 
 LinearRgb Colours::reflectance(const Material& material, std::vector<std::string>& notes) const {
-  if (bands_) return rgb(material.reflectance.values);
+  const std::vector<double> rho = normal_reflectance(material);
+  if (bands_) return rgb(rho);
   std::vector<double> reflected = light_;
-  for (std::size_t b = 0; b < reflected.size(); ++b) reflected[b] *= material.reflectance[b];
+  for (std::size_t b = 0; b < reflected.size(); ++b) reflected[b] *= rho[b];
   const LinearRgb to = rgb(reflected), from = rgb(light_);
   LinearRgb ratio{};
   bool clamped = false;

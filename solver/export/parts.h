@@ -25,9 +25,23 @@ std::array<double, 2> band_edges_nm(const WavelengthGrid& bands, std::size_t ban
 
 std::vector<double> emitted_radiance(const Material& material);  ///< M / pi
 
+/// What a surface reflects of light along its normal, one value a band: its reflectance, or
+/// Fresnel's from its optical constants.
+std::vector<double> normal_reflectance(const Material& material);
+
+/// Index of a dielectric in the middle band, for formats that hold one.
+double middle_index(const Material& material);
+
+/// The one refractive index of all bands. InputError that names `program`, which knows no other.
+double common_refractive_index(const Scene& scene, const Material& material, const char* program);
+
+/// InputError that says what `program` cannot hold: `expected` of the material instead of `found`.
+[[noreturn]] void refuse_material(const Scene& scene, const Material& material,
+                                  const std::string& expected, const std::string& found);
+
 /// Three colours of a material: by bands exactly, or by colorimetry. Linear, not clamped.
 /// Reflectances are ratios, reflected to incident, under the scene's own light: right for one
-/// bounce.
+/// bounce; those of metals are along the normal.
 class Colours {
  public:
   /// `rgb_from_xyz` turns tristimulus values into the format's RGB (white: equal energy or D65).

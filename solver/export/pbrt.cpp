@@ -7,7 +7,9 @@
 // - R, G, B come out as imaging ratio (ISO / 100) times integral(L xbar..zbar), without that
 //   factor: ISO brings it back, and they equal the R, G, B of `truebox render`;
 // - float16 unless told otherwise; 5 reflections unless told otherwise; camera space is
-//   left-handed, hence the mirror; `diffuse` reflects from both sides.
+//   left-handed, hence the mirror; `diffuse` and `conductor` reflect from both sides, roughness is
+//   GGX alpha only with remaproughness off, and a conductor of given reflectance has it along the
+//   normal only (materials.cpp).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -80,6 +82,35 @@ std::string shape(const std::vector<Triangle>& triangles) {
                      indices, points);
 }
 
+std::string material_line(const Scene& scene, const Material& m) {
+  const auto of_bands = [&](const char* name, const std::vector<double>& values) {
+    return fmt::format("  \"spectrum {}\" [{} ]\n", name, pairs(stepped(scene.bands, values)));
+  };
+  const auto named = [&](const char* type, const std::string& parameters) {
+    return fmt::format("MakeNamedMaterial \"{}\" \"string type\" [ \"{}\" ]\n{}", quoted(m.name),
+                       type, parameters);
+  };
+  switch (m.scattering) {
+    case Scattering::lambertian: break;
+    case Scattering::mirror:
+    case Scattering::rough_conductor:
+      if (m.refractive_index.values.empty())
+        refuse_material(scene, m,
+                        "a mirror of given refractive_index and absorption_index (pbrt knows no "
+                        "reflectance that is the same at every angle)",
+                        "a reflectance");
+      return named("conductor",
+                   of_bands("eta", m.refractive_index.values) +
+                       of_bands("k", m.absorption_index.values) +
+                       fmt::format("  \"float roughness\" [ {:.9g} ] \"bool remaproughness\" [ "
+                                   "false ]\n",
+                                   m.roughness));
+    case Scattering::dielectric:
+      return named("dielectric", of_bands("eta", m.refractive_index.values));
+  }
+  return named("diffuse", of_bands("reflectance", m.reflectance.values));
+}
+
 }  // namespace
 
 ExportSummary write_pbrt(const Scene& scene, const std::filesystem::path& target,
@@ -101,11 +132,7 @@ ExportSummary write_pbrt(const Scene& scene, const std::filesystem::path& target
       "Sampler \"independent\" \"integer pixelsamples\" [ 256 ]\n"
       "Integrator \"path\" \"integer maxdepth\" [ 100 ]\nWorldBegin\n";
   for (std::size_t m = 0; m < scene.materials.size(); ++m)
-    text += fmt::format(
-        "MakeNamedMaterial \"{}\" \"string type\" [ \"diffuse\" ]\n  \"spectrum reflectance\" [{} "
-        "]\n",
-        quoted(scene.materials[m].name),
-        pairs(stepped(scene.bands, scene.materials[m].reflectance.values)));
+    text += material_line(scene, scene.materials[m]);
   for (const Surface& surface : scene.surfaces) {
     if (surface.is_opening) continue;
     const Material& material = scene.material_of(surface);

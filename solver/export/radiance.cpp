@@ -2,7 +2,8 @@
 // Radiance. Units (Ward Larson & Shakespeare 1998; its reference manual): RGB radiance in
 // W m^-2 sr^-1 over primaries of its own and an equal-energy white; luminance =
 // 179 lm/W (0.265 R + 0.670 G + 0.065 B). `plastic` without gloss is Lambertian and reflects from
-// both sides; `light` shines from its front and reflects nothing.
+// both sides; `light` shines from its front and reflects nothing. `mirror` reflects alike at every
+// angle; `dielectric` takes the transmission of a unit length, an index and Hartmann's constant.
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -33,6 +34,28 @@ LinearRgb radiance_rgb(const Tristimulus& xyz) {
 
 std::string line(const LinearRgb& rgb) {
   return fmt::format("{:.9g} {:.9g} {:.9g}", rgb[0], rgb[1], rgb[2]);
+}
+
+std::string matter(const Scene& scene, const Material& material, const std::string& name,
+                   const Colours& colours, std::vector<std::string>& notes) {
+  switch (material.scattering) {
+    case Scattering::lambertian: break;
+    case Scattering::mirror:
+      if (!material.refractive_index.values.empty())
+        refuse_material(scene, material,
+                        "a mirror of one reflectance at every angle (Radiance knows no other)",
+                        "optical constants");
+      return fmt::format("\nvoid mirror {}\n0\n0\n3 {}\n", name,
+                         line(colours.reflectance(material, notes)));
+    case Scattering::rough_conductor:
+      refuse_material(scene, material, "no rough conductor (Radiance's metals have Ward's lobe)",
+                      "GGX facets");
+    case Scattering::dielectric:
+      return fmt::format("\nvoid dielectric {}\n0\n0\n5 1 1 1 {:.9g} 0\n", name,
+                         common_refractive_index(scene, material, "Radiance"));
+  }
+  return fmt::format("\nvoid plastic {}\n0\n0\n5 {} 0 0\n", name,
+                     line(colours.reflectance(material, notes)));
 }
 
 std::string view(const CameraDescription& c) {
@@ -74,8 +97,7 @@ ExportSummary write_radiance(const Scene& scene, const std::filesystem::path& ta
       for (const double rho : material.reflectance.values)
         if (rho > 0.0) lamps = "\"" + material.name + "\"";
     } else {
-      text += fmt::format("\nvoid plastic {}\n0\n0\n5 {} 0 0\n", name,
-                          line(colours.reflectance(material, summary.notes)));
+      text += matter(scene, material, name, colours, summary.notes);
     }
   }
   for (std::size_t s = 0; s < scene.surfaces.size(); ++s) {

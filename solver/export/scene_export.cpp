@@ -34,10 +34,6 @@ ExportSummary written(const Scene& scene, ExportFormat format, const std::filesy
 
 ExportSummary export_scene(const Scene& scene, ExportFormat format,
                            const std::filesystem::path& target, const ExportOptions& options) {
-  for (const Surface& surface : scene.surfaces)
-    if (scene.material_of(surface).scattering != Scattering::lambertian)
-      throw InputError(scene.path, 0, "Lambertian surfaces only, which is what is exported",
-                       "surface \"" + surface.name + "\", which is not");
   if (scene.is_total)
     throw InputError(scene.path, 0, "bands of wavelengths (other renderers show light)",
                      "one band over all wavelengths");

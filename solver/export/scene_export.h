@@ -36,6 +36,9 @@ struct ExportSummary {
 ///   radiance  RGB in W m^-2 sr^-1 with 179 lm/W over its own primaries and white
 ///   obj       Kd, Ke linear BT.709; Ke as the R, G, B of `truebox render`
 ///   gltf      linear BT.709; emission in cd m^-2 (683 lm/W)
+/// Mirrors, rough conductors and clear dielectrics become the other program's own, by the same
+/// equations in mitsuba and pbrt; radiance knows ideal mirrors and one refractive index; obj and
+/// gltf are for looking at, and the notes say how they differ.
 /// Spectra are written as steps, one a band; cameras as pinholes. InputError (naming the scene) for
 /// an unknown camera or band, a target of another kind, or what the format cannot say.
 ExportSummary export_scene(const Scene& scene, ExportFormat format,
