@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <optional>
 
+#include "radiometry/input_error.h"
 #include "scene/scene_file.h"
 
 namespace truebox::app {
@@ -44,6 +45,12 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
   command.add_option("--method", a.method, "how the radiosity system is solved; see truebox sweep")
       ->capture_default_str()
       ->check(CLI::IsMember(methods));
+  command
+      .add_option("--form-factors", a.form_factors,
+                  "what tells how much of a pair is hidden: ray-casting, or exact-visibility "
+                  "(shadow outlines, no noise)")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"ray-casting", "exact-visibility"}));
   command.add_option("--solver-bound", a.relative_bound, "stop at this relative error bound")
       ->capture_default_str()
       ->check(CLI::Range(1e-13, 0.5));
@@ -56,6 +63,16 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       });
   command.add_option("--threads", a.threads, "threads, 0 for all")->check(CLI::Range(0, 1024));
   command.add_flag("--quiet", a.quiet, "no progress");
+}
+
+const CameraDescription& find_camera(const Scene& scene, const std::string& name) {
+  std::string known;
+  for (const auto& [key, camera] : scene.cameras) {
+    if (key == name || (name.empty() && scene.cameras.size() == 1)) return camera;
+    known += (known.empty() ? "" : ", ") + key;
+  }
+  throw InputError(scene.path, 0, "one of the cameras: " + (known.empty() ? "(none)" : known),
+                   name.empty() ? "no --camera" : "\"" + name + "\"");
 }
 
 Progress terminal_progress(bool quiet) {
@@ -80,6 +97,9 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
   PredictOptions options;
   options.elements = a.elements;
   options.form_factors.rays = a.rays;
+  if (a.form_factors == "exact-visibility")
+    options.form_factors.method = FormFactorMethod::exact_visibility;
+  options.solve_grid = a.solve_grid;
   options.solve.method = method_of_name(a.method);
   options.solve.relative_bound = a.relative_bound;
   options.error_shares = a.error_shares;
@@ -108,19 +128,22 @@ std::string describe(const Predicted& p) {
                                  p.scene.bands.size(), p.seconds);
   for (const auto& reason : p.prediction->needs().reasons) text += "  " + reason + "\n";
   if (!p.prediction->needs().interreflection) return text;
-  text += fmt::format(
-      "  form factors: {} pairs without anything between, {} hidden, {} sampled with {} rays\n",
-      f.pairs_unoccluded, f.pairs_hidden, f.pairs_sampled, f.rays);
+  text += fmt::format("  form factors: {} pairs without anything between, {} hidden, {} {}\n",
+                      f.pairs_unoccluded, f.pairs_hidden, f.pairs_sampled,
+                      f.method == FormFactorMethod::exact_visibility
+                          ? "partly hidden, by outlines of the shadows"
+                          : fmt::format("sampled with {} rays", f.rays));
   if (f.buried_patches > 0)
     text +=
         fmt::format("  {} elements lie under another surface and see nothing\n", f.buried_patches);
-  text += f.closed ? fmt::format(
-                         "  closure: none of {} rays escaped; row sums off by {:.1e} mean, {:.1e} "
-                         "max; sampled factors scaled by at most {:.1e}, then off by {:.1e}\n",
-                         f.closure_rays, f.closure_error_mean, f.closure_error_max, f.repair_max,
-                         f.closure_residual_max)
-                   : fmt::format("  the scene is open (no repair); largest row sum {:.6f}\n",
-                                 f.row_sum_max);
+  text +=
+      f.closed
+          ? fmt::format(
+                "  closure: none of {} rays escaped; row sums off by {:.1e} mean, {:.1e} "
+                "max; partly hidden factors scaled by at most {:.1e}, then off by {:.1e}\n",
+                f.closure_rays, f.closure_error_mean, f.closure_error_max, f.repair_max,
+                f.closure_residual_max)
+          : fmt::format("  the scene is open (no repair); largest row sum {:.6f}\n", f.row_sum_max);
   text += "  radiosity: " + grid.solve.brief() + "\n";
   if (const auto& shares = p.prediction->error_shares())
     text += fmt::format(

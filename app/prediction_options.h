@@ -20,9 +20,11 @@ struct PredictionArguments {
   std::size_t elements = PredictOptions{}.elements;
   int rays = FormFactorOptions{}.rays;
   std::string method = "krylov";
+  std::string form_factors = "ray-casting";
   double relative_bound = SolveOptions{}.relative_bound;
   std::string target_error;  ///< "0.5%" or "0.005": chooses elements and solver bound
   bool error_shares = false, sensitivities = false;  ///< as in PredictOptions
+  SolveGrid solve_grid;                              ///< as in PredictOptions
   int threads = 0;
   bool quiet = false;
 };
@@ -42,6 +44,9 @@ struct Predicted {
 
 /// Reads and solves; shows progress. The caller checks `prediction->outcome()` and `misses_target`.
 std::unique_ptr<Predicted> predict(const PredictionArguments& arguments);
+
+/// The camera of that name, or the only one. InputError if there is none.
+const CameraDescription& find_camera(const Scene& scene, const std::string& name);
 
 /// A progress line on stderr if that is a terminal, nothing otherwise.
 Progress terminal_progress(bool quiet = false);

@@ -36,16 +36,6 @@ struct RenderArguments {
   SensorArguments sensor;
 };
 
-const CameraDescription& find_camera(const Scene& scene, const std::string& name) {
-  std::string known;
-  for (const auto& [key, camera] : scene.cameras) {
-    if (key == name || (name.empty() && scene.cameras.size() == 1)) return camera;
-    known += (known.empty() ? "" : ", ") + key;
-  }
-  throw InputError(scene.path, 0, "one of the cameras: " + (known.empty() ? "(none)" : known),
-                   name.empty() ? "no --camera" : "\"" + name + "\"");
-}
-
 double mean_share(const RenderedImage& image) {
   double bound = 0.0, radiance = 0.0;
   for (std::size_t c = 0; c < image.radiance.channels.size(); ++c)

@@ -13,6 +13,9 @@
 #include "image/image_file.h"
 #include "prediction_options.h"
 #include "radiometry/input_error.h"
+#include "ranks.h"
+#include "scene/scene_file.h"
+#include "snapshots.h"
 #include "transport/net_flux.h"
 #include "walkthrough/walkthrough.h"
 
@@ -22,6 +25,9 @@ namespace {
 struct SolveArguments {
   PredictionArguments prediction;
   std::string output, summary;
+  bool distributed = false;
+  std::string petsc_options;
+  std::string snapshots, camera;
 };
 
 Observer observer() {
@@ -153,13 +159,15 @@ const std::map<std::string, std::string (*)(const Predicted&)>& writers() {
   return kWriters;
 }
 
-int solve(const SolveArguments& a) {
+int solve_here(const SolveArguments& a, Ranks* ranks) {
   const auto writer = writers().find(std::filesystem::path(a.output).extension().string());
   if (!a.output.empty() && writer == writers().end())
     throw InputError(a.output, 0, "an output ending in .json, .vtu, .glb or .html",
                      std::filesystem::path(a.output).extension().string());
   const auto predicted = predict(a.prediction);
+  if (ranks && !ranks->is_first()) return kAgrees;  // the first rank says and writes all
   fmt::print("{}", describe(*predicted));
+  if (ranks) fmt::print("{}", ranks->describe());
   if (predicted->prediction->outcome() != SolveOutcome::converged) {
     fmt::print(stderr, "truebox: the solver did not reach its bound: {}\n",
                predicted->prediction->fine().solve.brief());
@@ -170,6 +178,29 @@ int solve(const SolveArguments& a) {
   if (!a.output.empty()) write_file_atomically(a.output, writer->second(*predicted));
   if (!a.summary.empty()) write_file_atomically(a.summary, summary_json(*predicted).dump(1) + "\n");
   return predicted->misses_target ? kNotSolved : kAgrees;
+}
+
+int solve(const SolveArguments& a) {
+  if (!a.snapshots.empty()) {
+    if (a.distributed || a.prediction.sensitivities)
+      throw InputError("--snapshots", 0, "a plain solve",
+                       a.distributed ? "--distributed" : "--sensitivities");
+    const Scene scene = read_scene(a.prediction.scene);
+    SolveArguments watched = a;
+    watched.snapshots.clear();
+    watched.prediction.solve_grid = with_snapshots(scene, {a.snapshots, a.camera, 384, observer()},
+                                                   terminal_progress(a.prediction.quiet));
+    const int code = solve_here(watched, nullptr);
+    fmt::print("Pictures of the way there: {}\n", a.snapshots);
+    return code;
+  }
+  if (!a.distributed) return solve_here(a, nullptr);
+  Ranks ranks(a.petsc_options);
+  return ranks.guarded([&] {
+    SolveArguments of_rank = a;
+    ranks.prepare(of_rank.prediction);
+    return solve_here(of_rank, &ranks);
+  });
 }
 
 }  // namespace
@@ -186,7 +217,18 @@ void add_solve_command(CLI::App& program, Action& chosen) {
                       "means of the surfaces (.json) or all elements (.vtu for ParaView, .glb, "
                       ".html to walk through)");
   command->add_option("--summary", arguments->summary, "how the solve went, as JSON");
-  command->footer("Example: truebox solve reference/cornell_box/cornell_box.toml -o box.vtu");
+  command->add_option("--snapshots", arguments->snapshots,
+                      "folder for pictures of the solution on its way (with --method southwell or "
+                      "southwell-ambient: usable long before the end)");
+  command->add_option("--camera", arguments->camera, "the camera of these pictures");
+  command->add_flag("--distributed", arguments->distributed,
+                    "one of the ranks that mpirun started: rows of form factors (exact-visibility) "
+                    "are shared out");
+  command->add_option("--petsc-options", arguments->petsc_options,
+                      "PETSc's own, for --distributed: \"-ksp_type gmres -ksp_monitor\"");
+  command->footer(
+      "Example: truebox solve reference/cornell_box/cornell_box.toml -o box.vtu\n"
+      "         mpirun -n 4 truebox solve scene.toml --distributed -o scene.json");
   command->callback([=, &chosen] { chosen = [=] { return solve(*arguments); }; });
 }
 

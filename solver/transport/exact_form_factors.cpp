@@ -317,25 +317,45 @@ template ExactFormFactors<double> exact_form_factors(const PatchMesh&, const Sce
 void stream_form_factors(
     const PatchMesh& mesh, const Scene& scene, const ExactFormFactorOptions& options,
     const std::function<void(std::size_t i, std::span<const double> row_m2)>& visit) {
+  stream_form_factors(mesh, scene, options, 0, mesh.size(),
+                      [&](const FormFactorRow& row) { visit(row.patch, row.exchange_area_m2); });
+}
+
+void stream_form_factors(const PatchMesh& mesh, const Scene& scene,
+                         const ExactFormFactorOptions& options, std::size_t begin, std::size_t end,
+                         const std::function<void(const FormFactorRow& row)>& visit) {
   const ExactPairs pairs(mesh, scene, options);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.size(), 4), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 4), [&](const auto& range) {
     ShadowCones cones = pairs.cones();
     VisibleParts parts;
-    std::vector<double> row(mesh.size());
+    std::vector<double> values(mesh.size());
+    std::vector<std::uint32_t> partial;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      std::fill(row.begin(), row.end(), 0.0);
+      std::fill(values.begin(), values.end(), 0.0);
+      partial.clear();
+      FormFactorRow row;
+      row.patch = i;
       PairPlanner::Visitor visitor;
-      visitor.hidden = [](std::size_t) {};
+      visitor.hidden = [&](std::size_t count) { row.hidden += count; };
       visitor.unoccluded = [&](auto of_i, auto of_j) {
-        for (std::uint32_t j : of_j) row[j] = pairs.kernel.exchange_area_m2(of_i[0], j);
+        for (std::uint32_t j : of_j) {
+          values[j] = pairs.kernel.exchange_area_m2(of_i[0], j);
+          row.unoccluded += values[j] > 0.0;
+        }
       };
       visitor.partial = [&](std::uint32_t a, std::uint32_t b, auto blockers) {
         const PartialPair pair = pairs.oriented(std::min(a, b), std::max(a, b));
         cones.move_to(pair.receiver);
-        row[b] = pairs.exchange_m2(pair, blockers, cones, parts);
+        values[b] = pairs.exchange_m2(pair, blockers, cones, parts);
+        if (values[b] > 0.0)
+          partial.push_back(b);
+        else
+          ++row.hidden;
       };
       pairs.planner.visit_row(static_cast<std::uint32_t>(i), visitor);
-      visit(i, row);
+      row.exchange_area_m2 = values;
+      row.partial = partial;
+      visit(row);
     }
   });
 }

@@ -50,4 +50,17 @@ void stream_form_factors(
     const PatchMesh& mesh, const Scene& scene, const ExactFormFactorOptions& options,
     const std::function<void(std::size_t i, std::span<const double> row_m2)>& visit);
 
+/// One row and how its pairs came about; valid during the visit.
+struct FormFactorRow {
+  std::size_t patch = 0;
+  std::span<const double> exchange_area_m2;  ///< A_i F_ij of every patch j
+  std::span<const std::uint32_t> partial;    ///< those j whose visibility is a quadrature
+  std::size_t unoccluded = 0, hidden = 0;    ///< pairs of this row; each is in two rows
+};
+
+/// The same for the rows from `begin` to before `end` only.
+void stream_form_factors(const PatchMesh& mesh, const Scene& scene,
+                         const ExactFormFactorOptions& options, std::size_t begin, std::size_t end,
+                         const std::function<void(const FormFactorRow& row)>& visit);
+
 }  // namespace truebox

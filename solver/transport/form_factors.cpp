@@ -12,6 +12,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "transport/exact_form_factors.h"
 #include "transport/form_factor.h"
 
 namespace truebox {
@@ -221,36 +222,13 @@ class Builder {
     rays_ += rays;
   }
 
-  // The underside of a block that stands on a floor: a surface of opposite normal at its centroid.
-  bool lies_on_a_back(std::size_t i) const {
-    const Vec3& normal = mesh_.plane_of(mesh_.patches[i]).normal;
-    const Vec3& centre = mesh_.patches[i].centroid;
-    for (std::uint32_t b : blockers_) {
-      const Piece& piece = mesh_.pieces[b];
-      if (std::abs(piece.plane.distance_m(centre)) > tolerance_m_ ||
-          piece.plane.normal.dot(normal) > -1.0 + 1e-9)
-        continue;
-      bool inside = true;
-      const std::size_t n = piece.polygon.size();
-      for (std::size_t k = 0; k < n && inside; ++k) {
-        const Vec3& a = piece.polygon[k];
-        inside = piece.plane.normal.cross(piece.polygon[(k + 1) % n] - a).dot(centre - a) > 0.0;
-      }
-      if (inside) return true;
-    }
-    return false;
-  }
-
   // A patch under a block sees nothing: every ray from it meets the back of a surface at once.
   void mark_buried(FormFactors& factors) const {
     factors.usable.assign(mesh_.size(), 1);
     for (std::size_t i = 0; i < mesh_.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i);
       if (factors.exchange_area_m2.col(row).sum() > 1e-4 * factors.area_m2[row]) continue;
-      const Vec3& normal = mesh_.plane_of(mesh_.patches[i]).normal;
-      const auto hit = visibility_.first_hit(
-          mesh_.patches[i].centroid + visibility_.offset_m() * normal, normal, true);
-      if (hit ? hit->front : !lies_on_a_back(i)) continue;
+      if (!is_buried(mesh_, scene_, visibility_, i)) continue;
       factors.usable[i] = 0;
       ++factors.summary.buried_patches;
       factors.exchange_area_m2.col(row).setZero();
@@ -258,30 +236,11 @@ class Builder {
     }
   }
 
-  // Cosine-distributed rays from every element: closed if none escapes.
   void test_closure(FormFactors& factors) const {
-    std::size_t escaped = 0, cast = 0;
-    for (std::size_t i = 0; i < mesh_.size(); ++i) {
-      const Patch& patch = mesh_.patches[i];
-      if (!factors.usable[i] || scene_.surfaces[mesh_.surface_of(patch)].is_opening) continue;
-      const Vec3& n = mesh_.plane_of(patch).normal;
-      const Vec3 t = n.unitOrthogonal(), b = n.cross(t);
-      std::uint64_t state = hash(options_.seed + 77 + i);
-      const auto random = [&state] {
-        state = hash(state);
-        return unit_interval(state);
-      };
-      for (int k = 0; k < 16; ++k, ++cast) {
-        const double r2 = random(), phi = 2.0 * std::numbers::pi * random();
-        const Vec3 direction =
-            std::sqrt(r2) * (std::cos(phi) * t + std::sin(phi) * b) + std::sqrt(1.0 - r2) * n;
-        const double u = random(), v = random();
-        const Vec3 origin = sample_polygon(shapes_[i].polygon.vertices, u, v);
-        if (!visibility_.first_hit(origin + visibility_.offset_m() * n, direction, true)) ++escaped;
-      }
-    }
-    factors.summary.closure_rays = cast;
-    factors.summary.closed = cast > 0 && escaped == 0;
+    const std::size_t escaped =
+        escaping_rays(mesh_, scene_, visibility_, factors.usable, options_.seed, 0, mesh_.size(),
+                      factors.summary.closure_rays);
+    factors.summary.closed = factors.summary.closure_rays > 0 && escaped == 0;
   }
 
   // Scales only sampled entries, S_ij <- x_i x_j S_ij, until each row sums to its area.
@@ -366,9 +325,121 @@ void require_memory(std::size_t elements, const FormFactorOptions& options) {
                           std::to_string(static_cast<std::size_t>(fits)) + " elements");
 }
 
+namespace {
+
+// The underside of a block that stands on a floor: a surface of opposite normal at its centroid.
+bool lies_on_a_back(const PatchMesh& mesh, const Scene& scene, std::size_t i) {
+  const double tolerance_m = 1e-9 * scene.diameter_m();
+  const Vec3& normal = mesh.plane_of(mesh.patches[i]).normal;
+  const Vec3& centre = mesh.patches[i].centroid;
+  for (const Piece& piece : mesh.pieces) {
+    if (scene.surfaces[piece.surface].is_opening ||
+        std::abs(piece.plane.distance_m(centre)) > tolerance_m ||
+        piece.plane.normal.dot(normal) > -1.0 + 1e-9)
+      continue;
+    bool inside = true;
+    const std::size_t n = piece.polygon.size();
+    for (std::size_t k = 0; k < n && inside; ++k) {
+      const Vec3& a = piece.polygon[k];
+      inside = piece.plane.normal.cross(piece.polygon[(k + 1) % n] - a).dot(centre - a) > 0.0;
+    }
+    if (inside) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+bool is_buried(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+               std::size_t i) {
+  const Vec3& normal = mesh.plane_of(mesh.patches[i]).normal;
+  const auto hit =
+      visibility.first_hit(mesh.patches[i].centroid + visibility.offset_m() * normal, normal, true);
+  return hit ? !hit->front : lies_on_a_back(mesh, scene, i);
+}
+
+std::size_t escaping_rays(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+                          const std::vector<char>& usable, std::uint64_t seed, std::size_t begin,
+                          std::size_t end, std::size_t& rays) {
+  constexpr int kRaysEach = 16;
+  std::size_t escaped = 0;
+  Polygon polygon;
+  for (std::size_t i = begin; i < end; ++i) {
+    const Patch& patch = mesh.patches[i];
+    if (!usable[i] || scene.surfaces[mesh.surface_of(patch)].is_opening) continue;
+    mesh.polygon_of(patch, polygon);
+    const Vec3& n = mesh.plane_of(patch).normal;
+    const Vec3 t = n.unitOrthogonal(), b = n.cross(t);
+    std::uint64_t state = hash(seed + 77 + i);
+    const auto random = [&state] {
+      state = hash(state);
+      return unit_interval(state);
+    };
+    for (int k = 0; k < kRaysEach; ++k) {
+      const double r2 = random(), phi = 2.0 * std::numbers::pi * random();
+      const Vec3 direction =
+          std::sqrt(r2) * (std::cos(phi) * t + std::sin(phi) * b) + std::sqrt(1.0 - r2) * n;
+      const double u = random(), v = random();
+      const Vec3 origin = sample_polygon(polygon, u, v);
+      if (!visibility.first_hit(origin + visibility.offset_m() * n, direction, true)) ++escaped;
+    }
+    rays += kRaysEach;
+  }
+  return escaped;
+}
+
+namespace {
+
+FormFactors without_rays(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+                         const FormFactorOptions& options) {
+  ExactFormFactorOptions exact_options;
+  exact_options.relative_tolerance = options.relative_tolerance;
+  exact_options.occlusion = options.occlusion;
+  auto exact = exact_form_factors<double>(mesh, scene, exact_options, options.memory_limit_bytes);
+  FormFactors result;
+  result.exchange_area_m2 = std::move(exact.exchange_area_m2);
+  result.area_m2 = std::move(exact.area_m2);
+  result.usable = std::move(exact.usable);
+  FormFactorSummary& summary = result.summary;
+  summary.method = FormFactorMethod::exact_visibility;
+  summary.pairs_unoccluded = exact.pairs_unoccluded;
+  summary.pairs_hidden = exact.pairs_hidden;
+  summary.pairs_sampled = exact.pairs_partial;
+  for (Eigen::Index i = 0; i < result.size(); ++i) {
+    char& usable = result.usable[static_cast<std::size_t>(i)];
+    if (result.exchange_area_m2.col(i).sum() < kMayBeBuried * result.area_m2[i])
+      usable = !is_buried(mesh, scene, visibility, static_cast<std::size_t>(i));
+    if (usable) continue;
+    ++summary.buried_patches;
+    result.exchange_area_m2.col(i).setZero();
+    result.exchange_area_m2.row(i).setZero();
+  }
+  const std::size_t escaped = escaping_rays(mesh, scene, visibility, result.usable, options.seed, 0,
+                                            mesh.size(), summary.closure_rays);
+  summary.closed = summary.closure_rays > 0 && escaped == 0;
+  if (summary.closed) {
+    const ClosureReport report =
+        repair_closure(result.exchange_area_m2, result.area_m2, result.usable, exact.partial,
+                       ClosureRepair::scaling);
+    summary.closure_error_max = report.error_before_max;
+    summary.closure_error_mean = report.error_before_rms;
+    summary.repair_max = report.change_max;
+    summary.closure_residual_max = report.error_after_max;
+  }
+  summary.row_sum_max = 0.0;
+  for (Eigen::Index i = 0; i < result.size(); ++i)
+    summary.row_sum_max =
+        std::max(summary.row_sum_max, result.exchange_area_m2.col(i).sum() / result.area_m2[i]);
+  return result;
+}
+
+}  // namespace
+
 FormFactors form_factors(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
                          const FormFactorOptions& options) {
   require_memory(mesh.size(), options);
+  if (options.method == FormFactorMethod::exact_visibility)
+    return without_rays(mesh, scene, visibility, options);
   return Builder(mesh, scene, visibility, options).build();
 }
 

@@ -45,12 +45,23 @@ BandMatrix mean_direct(const PatchMesh& mesh, const Gather& gather, Index bands)
 
 }  // namespace
 
+FormFactors solve_full_matrix(const GridTask& task, GridSolution& grid, const Progress& progress) {
+  const Visibility visibility(grid.mesh, task.scene);
+  FormFactors factors = form_factors(grid.mesh, task.scene, visibility, task.form_factors);
+  grid.usable = factors.usable;
+  grid.form_factors = factors.summary;
+  grid.solve = solve_radiosity(factors, task.rho, task.source, task.solve, grid.reflected, progress,
+                               &grid.indirect);
+  return factors;
+}
+
 Prediction::Prediction(const Scene& scene, const PredictOptions& options)
     : scene_(&scene), needs_(requirements(scene)) {
   require_lambertian(scene);
   distinct_scene_ = in_bands(scene, needs_.distinct_bands);
   const double edge_m = edge_for_count(scene, std::max<std::size_t>(1, options.elements / 16));
-  if (needs_.interreflection)  // the finest grid decides; better told before the others are solved
+  // The finest grid decides; better told before the others are solved.
+  if (needs_.interreflection && !options.solve_grid)
     require_memory(uniform_mesh(distinct_scene_, edge_m, kFinestSplit).size(),
                    options.form_factors);
   for (int k = 2; k >= 0; --k) levels_[k] = solve_level(edge_m, kFinestSplit - k, options);
@@ -86,12 +97,13 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   factor_options.occlusion = needs_.occlusion;
   factor_options.seed = options.form_factors.seed + static_cast<std::uint64_t>(split);
   factor_options.progress = options.progress;
-  const Visibility visibility(grid.mesh, distinct_scene_);
-  const FormFactors factors = form_factors(grid.mesh, distinct_scene_, visibility, factor_options);
-  grid.usable = factors.usable;
-  grid.form_factors = factors.summary;
-  grid.solve = solve_radiosity(factors, rho, source, options.solve, grid.reflected,
-                               options.progress, &grid.indirect);
+  const GridTask task{distinct_scene_, rho,           source,
+                      factor_options,  options.solve, split == kFinestSplit};
+  if (options.solve_grid) {
+    options.solve_grid(task, grid);
+    return level;
+  }
+  const FormFactors factors = solve_full_matrix(task, grid, options.progress);
   if (options.sensitivities && split == kFinestSplit)
     differentiate(factors, rho, options.solve, grid);
   return level;

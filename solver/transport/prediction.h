@@ -16,12 +16,28 @@
 
 namespace truebox {
 
+struct GridSolution;
+
+/// One grid's system: `source` is rho times direct light, elements x bands, W m^-2 nm^-1.
+struct GridTask {
+  const Scene& scene;  ///< in the bands that need solving
+  const BandMatrix& rho;
+  const BandMatrix& source;
+  const FormFactorOptions& form_factors;
+  const SolveOptions& solve;
+  bool is_finest = false;
+};
+
+/// Finds form factors and solution of one grid: fills all of it but mesh and direct light.
+using SolveGrid = std::function<void(const GridTask& task, GridSolution& grid)>;
+
 struct PredictOptions {
   std::size_t elements = 6000;  ///< of the fine grid, about
   FormFactorOptions form_factors;
   SolveOptions solve;
   bool error_shares = false;   ///< solve the middle grid twice, to tell what part is the rays'
   bool sensitivities = false;  ///< of the fine grid to each material's reflectance
+  SolveGrid solve_grid;        ///< instead of a full matrix in this process; empty: that
   Progress progress;
 };
 
@@ -45,6 +61,10 @@ struct GridSolution {
   /// d (mean radiosity of each surface) / d rho of each material: surfaces x bands a material.
   std::vector<BandMatrix> radiosity_by_reflectance;
 };
+
+/// A SolveGrid: one full matrix of form factors, here. Returns it.
+FormFactors solve_full_matrix(const GridTask& task, GridSolution& grid,
+                              const Progress& progress = {});
 
 /// Irradiance (W m^-2 nm^-1) in each band and what it can be wrong by.
 struct BoundedIrradiance {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
-#include <sys/wait.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -13,6 +11,7 @@
 #include "image/image_file.h"
 #include "image/spectral_image.h"
 #include "support/json_schema.h"
+#include "support/run_command.h"
 
 namespace truebox {
 namespace {
@@ -21,23 +20,11 @@ using testing::HasSubstr;
 using testing::Not;
 namespace fs = std::filesystem;
 
-struct Outcome {
-  int code = -1;
-  std::string text;
-};
+using Outcome = CommandOutcome;
 
 Outcome run(const std::string& arguments) {
-  FILE* pipe = popen(
-      ("TRUEBOX_REFERENCE='" TRUEBOX_REFERENCE_DIR "' '" TRUEBOX_PROGRAM "' " + arguments + " 2>&1")
-          .c_str(),
-      "r");
-  Outcome result;
-  char buffer[4096];
-  for (std::size_t n; pipe && (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;)
-    result.text.append(buffer, n);
-  const int status = pipe ? pclose(pipe) : -1;
-  result.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return result;
+  return run_command("TRUEBOX_REFERENCE='" TRUEBOX_REFERENCE_DIR "' '" TRUEBOX_PROGRAM "' " +
+                     arguments);
 }
 
 std::string text_of(const fs::path& path) {

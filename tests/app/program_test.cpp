@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -14,6 +12,7 @@
 #include "image/image_file.h"
 #include "image/spectral_image.h"
 #include "radiometry/table_file.h"
+#include "support/run_command.h"
 
 namespace truebox {
 namespace {
@@ -23,23 +22,11 @@ namespace fs = std::filesystem;
 
 const std::string kScene = std::string(TRUEBOX_REFERENCE_DIR) + "/cornell_box/cornell_box.toml";
 
-struct Outcome {
-  int code = -1;
-  std::string text;  // stdout and stderr
-};
+using Outcome = CommandOutcome;
 
 Outcome run(const std::string& arguments) {
-  const std::string command =
-      "TRUEBOX_REFERENCE='" TRUEBOX_REFERENCE_DIR "' '" TRUEBOX_PROGRAM "' " + arguments + " 2>&1";
-  FILE* pipe = popen(command.c_str(), "r");
-  Outcome result;
-  if (!pipe) return result;
-  char buffer[4096];
-  for (std::size_t n; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;)
-    result.text.append(buffer, n);
-  const int status = pclose(pipe);
-  result.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return result;
+  return run_command("TRUEBOX_REFERENCE='" TRUEBOX_REFERENCE_DIR "' '" TRUEBOX_PROGRAM "' " +
+                     arguments);
 }
 
 std::string text_of(const fs::path& path) {

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
-#include <sys/wait.h>
 
-#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "radiometry/table_file.h"
+#include "support/run_command.h"
 #include "support/scratch.h"
 #include "verification/view_factor_scenes.h"
 
@@ -16,21 +15,10 @@ namespace {
 
 using testing::HasSubstr;
 
-struct Outcome {
-  int code = -1;
-  std::string text;  // stdout and stderr
-};
+using Outcome = CommandOutcome;
 
 Outcome program(const std::string& arguments) {
-  FILE* pipe = popen(("'" TRUEBOX_PROGRAM "' " + arguments + " 2>&1").c_str(), "r");
-  Outcome result;
-  if (!pipe) return result;
-  char buffer[4096];
-  for (std::size_t n; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;)
-    result.text.append(buffer, n);
-  const int status = pclose(pipe);
-  result.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return result;
+  return run_command("'" TRUEBOX_PROGRAM "' " + arguments);
 }
 
 Outcome viewfactor(const std::string& arguments) { return program("viewfactor " + arguments); }

@@ -35,6 +35,7 @@ const std::map<std::string, Modules>& allowed_modules() {
       {"solver/path_tracer", {"radiometry", "image", "scene", "rays"}},
       {"solver/mesh", {"radiometry", "image", "scene"}},
       {"solver/transport", {"radiometry", "image", "scene", "rays", "mesh"}},
+      {"solver/distributed", {"radiometry", "image", "scene", "rays", "mesh", "transport"}},
       {"solver/sensor", {"radiometry", "image", "scene", "mesh", "transport"}},
       {"solver/export", {"radiometry", "image", "scene", "mesh", "transport"}},
       {"reference/provenance", {"radiometry", "image"}},
@@ -62,6 +63,8 @@ struct ThirdParty {
 const std::vector<ThirdParty>& third_parties() {
   static const std::vector<ThirdParty> kTable = {
       {"embree3/", {"solver/rays"}},
+      {"petsc", {"solver/distributed"}},
+      {"mpi.h", {"solver/distributed"}, true},  // in a header that no other folder includes
       {"Imf", {"solver/image"}},
       {"OpenEXR/", {"solver/image"}},
       {"Imath", {"solver/image"}},

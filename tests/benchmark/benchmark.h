@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "scene/scene.h"
+#include "transport/form_factors.h"
 
 namespace truebox::benchmark {
 
@@ -46,6 +47,7 @@ Accuracy measure_accuracy(const Scene& scene, const std::filesystem::path& refer
 /// bands, against independent path tracing.
 struct ClosedBox {
   std::size_t elements = 0;
+  FormFactorMethod method = FormFactorMethod::ray_casting;
   int threads = 1;
   double job_s = 0.0;
   double job_cpu_s = 0.0;  ///< processor time, all threads: what a busy machine does not change
@@ -56,7 +58,7 @@ struct ClosedBox {
   double covered = 0.0;  ///< share of errors within bound + 3 standard errors
 };
 ClosedBox measure_closed_box(const std::filesystem::path& reference_dir, std::size_t elements,
-                             int threads);
+                             int threads, FormFactorMethod method);
 
 /// What the machine does, and what the program makes of it.
 struct Kernels {

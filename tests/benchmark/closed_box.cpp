@@ -50,12 +50,13 @@ double cpu_s() {
 }  // namespace
 
 ClosedBox measure_closed_box(const std::filesystem::path& reference_dir, std::size_t elements,
-                             int threads) {
+                             int threads, FormFactorMethod method) {
   const auto folder = reference_dir / "independent_renders";
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(threads));
   ClosedBox result;
   result.threads = threads;
+  result.method = method;
   Scene scene;
   std::unique_ptr<Prediction> prediction;
   const double cpu_before_s = cpu_s();
@@ -63,6 +64,7 @@ ClosedBox measure_closed_box(const std::filesystem::path& reference_dir, std::si
   const std::vector<Cell> cells = read_cells(folder / "closed_box_cell_irradiance.csv", scene);
   PredictOptions options;
   options.elements = elements;
+  options.form_factors.method = method;
   const double solve_s =
       seconds([&] { prediction = std::make_unique<Prediction>(scene, options); });
   const auto bands = static_cast<Eigen::Index>(scene.bands.size());
@@ -94,15 +96,6 @@ ClosedBox measure_closed_box(const std::filesystem::path& reference_dir, std::si
       result.mean_bound += bound[c][b] / expected;
       result.covered += error <= bound[c][b] + 3.0 * standard_error ? 1.0 : 0.0;
       count += 1.0;
-    }
-  if (std::getenv("CELLS"))
-    for (std::size_t c = 0; c < cells.size(); ++c) {
-      double e = 0, z = 0;
-      for (Eigen::Index b = 1; b < bands; ++b)
-        e += std::pow(mean[c][b] / cells[c].irradiance[b] - 1, 2),
-            z += mean[c][b] / cells[c].irradiance[b] - 1;
-      std::printf("%-10s rms %.3f %% mean %.3f %% E %.3f\n", cells[c].name.c_str(),
-                  100 * std::sqrt(e / 30), 100 * z / 30, mean[c][15]);
     }
   result.rms_error = std::sqrt(result.rms_error / count);
   result.rms_standard_error = std::sqrt(result.rms_standard_error / count);

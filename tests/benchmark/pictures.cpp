@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <map>
 #include <memory>
 #include <random>
 
@@ -14,8 +15,10 @@ namespace truebox::benchmark {
 namespace {
 
 constexpr int kSide_px = 512;
-constexpr int kPixels = 500;          // picked at random; the truth of all would take hours
-constexpr int kTruthSamples = 65536;  // noise of 0.2 % where 64 give 6 %
+constexpr int kPixels = 500;             // picked at random; the truth of all would take hours
+constexpr double kTruthNoise = 2.5e-3;   // one standard error of a pixel and band
+constexpr int kFirstSamples = 16384;     // tell how many a pixel needs
+constexpr int kMostSamples = 8'388'608;  // dark corners
 
 template <class Work>
 double processor_seconds(const Work& work) {
@@ -57,6 +60,34 @@ void quantiles(const std::vector<double>& errors, PictureError& result) {
   result.p99 = at(0.99);
 }
 
+// Bright pixels are known after thousands of paths, dark corners after millions: each takes what it
+// needs. Later paths have a seed of their own, or pixels that looked quiet by chance would stay so.
+PathTracedImage trace_truth(const Scene& scene, const std::vector<int>& pixels) {
+  PathTracedImage truth = trace(scene, pixels, kFirstSamples, 1000);
+  std::map<int, std::vector<std::size_t>> needing;
+  for (std::size_t k = 0; k < pixels.size(); ++k) {
+    double noise = 0.0;
+    for (std::size_t c = 0; c < truth.radiance.channels.size(); ++c)
+      if (const double value = truth.radiance.channels[c].samples[k]; value > 0.0)
+        noise = std::max(noise, std::sqrt(truth.variance.channels[c].samples[k]) / value);
+    int samples = kFirstSamples;
+    const double needed = kFirstSamples * std::pow(noise / kTruthNoise, 2);
+    while (samples < needed && samples < kMostSamples) samples *= 2;
+    if (samples > kFirstSamples) needing[samples].push_back(k);
+  }
+  for (const auto& [samples, which] : needing) {
+    std::vector<int> some;
+    for (std::size_t k : which) some.push_back(pixels[k]);
+    const PathTracedImage traced = trace(scene, some, samples, 2000);
+    for (std::size_t c = 0; c < truth.radiance.channels.size(); ++c)
+      for (std::size_t i = 0; i < which.size(); ++i) {
+        truth.radiance.channels[c].samples[which[i]] = traced.radiance.channels[c].samples[i];
+        truth.variance.channels[c].samples[which[i]] = traced.variance.channels[c].samples[i];
+      }
+  }
+  return truth;
+}
+
 template <class Value>
 std::vector<double> relative_errors(const Image& truth, const Value& value) {
   std::vector<double> errors;
@@ -76,7 +107,7 @@ PictureBenchmark measure_pictures(const Scene& scene, const std::vector<std::siz
   std::vector<int> pixels(kPixels);
   for (int& pixel : pixels) pixel = any(random);
   PictureBenchmark result;
-  const PathTracedImage truth = trace(scene, pixels, kTruthSamples, 1000);
+  const PathTracedImage truth = trace_truth(scene, pixels);
   result.truth_noise.name = "truth's own noise";
   quantiles(relative_errors(truth.radiance,
                             [&](std::size_t c, std::size_t k) {
