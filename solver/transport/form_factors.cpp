@@ -4,14 +4,13 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <mutex>
-#include <numbers>
 #include <numeric>
 #include <stdexcept>
 
+#include "transport/enclosure.h"
 #include "transport/form_factor.h"
 
 namespace truebox {
@@ -28,30 +27,6 @@ struct PatchShape {
 };
 
 constexpr int kSampleWindows = 64;
-
-std::uint64_t hash(std::uint64_t x) {  // splitmix64 (Steele et al. 2014)
-  x += 0x9e3779b97f4a7c15ull;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-  return x ^ (x >> 31);
-}
-
-double unit_interval(std::uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1p-53; }
-
-// A point of a convex polygon, uniform for uniform (u, v): a triangle of the fan by area, then the
-// square-root map.
-Vec3 sample_polygon(const Polygon& p, double u, double v) {
-  double total = 0.0;
-  std::array<double, 16> area{};
-  const std::size_t fan = std::min<std::size_t>(p.size() - 2, area.size());
-  for (std::size_t i = 0; i < fan; ++i)
-    total += area[i] = (p[i + 1] - p[0]).cross(p[i + 2] - p[0]).norm();
-  double pick = u * total;
-  std::size_t i = 0;
-  while (i + 1 < fan && pick > area[i]) pick -= area[i++];
-  const double s = std::sqrt(std::clamp(pick / area[i], 0.0, 1.0));
-  return p[0] + s * ((1.0 - v) * (p[i + 1] - p[0]) + v * (p[i + 2] - p[0]));
-}
 
 class Builder {
  public:
@@ -91,7 +66,10 @@ class Builder {
     result.summary.pairs_sampled = partial_;
     result.summary.rays = rays_;
     mark_buried(result);
-    test_closure(result);
+    const ClosureTest closure =
+        test_closure(mesh_, scene_, visibility_, result.usable, options_.seed);
+    result.summary.closed = closure.closed;
+    result.summary.closure_rays = closure.rays;
     if (result.summary.closed) repair(result);
     result.summary.row_sum_max = 0.0;
     for (Eigen::Index i = 0; i < n; ++i)
@@ -221,67 +199,19 @@ class Builder {
     rays_ += rays;
   }
 
-  // The underside of a block that stands on a floor: a surface of opposite normal at its centroid.
-  bool lies_on_a_back(std::size_t i) const {
-    const Vec3& normal = mesh_.plane_of(mesh_.patches[i]).normal;
-    const Vec3& centre = mesh_.patches[i].centroid;
-    for (std::uint32_t b : blockers_) {
-      const Piece& piece = mesh_.pieces[b];
-      if (std::abs(piece.plane.distance_m(centre)) > tolerance_m_ ||
-          piece.plane.normal.dot(normal) > -1.0 + 1e-9)
-        continue;
-      bool inside = true;
-      const std::size_t n = piece.polygon.size();
-      for (std::size_t k = 0; k < n && inside; ++k) {
-        const Vec3& a = piece.polygon[k];
-        inside = piece.plane.normal.cross(piece.polygon[(k + 1) % n] - a).dot(centre - a) > 0.0;
-      }
-      if (inside) return true;
-    }
-    return false;
-  }
-
   // A patch under a block sees nothing: every ray from it meets the back of a surface at once.
   void mark_buried(FormFactors& factors) const {
     factors.usable.assign(mesh_.size(), 1);
     for (std::size_t i = 0; i < mesh_.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i);
-      if (factors.exchange_area_m2.col(row).sum() > 1e-4 * factors.area_m2[row]) continue;
-      const Vec3& normal = mesh_.plane_of(mesh_.patches[i]).normal;
-      const auto hit = visibility_.first_hit(
-          mesh_.patches[i].centroid + visibility_.offset_m() * normal, normal, true);
-      if (hit ? hit->front : !lies_on_a_back(i)) continue;
+      if (factors.exchange_area_m2.col(row).sum() > kEmptyRow * factors.area_m2[row] ||
+          !is_buried(mesh_, scene_, visibility_, i))
+        continue;
       factors.usable[i] = 0;
       ++factors.summary.buried_patches;
       factors.exchange_area_m2.col(row).setZero();
       factors.exchange_area_m2.row(row).setZero();
     }
-  }
-
-  // Cosine-distributed rays from every element: closed if none escapes.
-  void test_closure(FormFactors& factors) const {
-    std::size_t escaped = 0, cast = 0;
-    for (std::size_t i = 0; i < mesh_.size(); ++i) {
-      const Patch& patch = mesh_.patches[i];
-      if (!factors.usable[i] || scene_.surfaces[mesh_.surface_of(patch)].is_opening) continue;
-      const Vec3& n = mesh_.plane_of(patch).normal;
-      const Vec3 t = n.unitOrthogonal(), b = n.cross(t);
-      std::uint64_t state = hash(options_.seed + 77 + i);
-      const auto random = [&state] {
-        state = hash(state);
-        return unit_interval(state);
-      };
-      for (int k = 0; k < 16; ++k, ++cast) {
-        const double r2 = random(), phi = 2.0 * std::numbers::pi * random();
-        const Vec3 direction =
-            std::sqrt(r2) * (std::cos(phi) * t + std::sin(phi) * b) + std::sqrt(1.0 - r2) * n;
-        const double u = random(), v = random();
-        const Vec3 origin = sample_polygon(shapes_[i].polygon.vertices, u, v);
-        if (!visibility_.first_hit(origin + visibility_.offset_m() * n, direction, true)) ++escaped;
-      }
-    }
-    factors.summary.closure_rays = cast;
-    factors.summary.closed = cast > 0 && escaped == 0;
   }
 
   // Scales only sampled entries, S_ij <- x_i x_j S_ij, until each row sums to its area.

@@ -10,6 +10,7 @@
 #include "mesh/smooth_field.h"
 #include "scene/requirements.h"
 #include "transport/form_factors.h"
+#include "transport/found_exchange.h"
 #include "transport/gather.h"
 #include "transport/solve_radiosity.h"
 #include "transport/visibility.h"
@@ -19,6 +20,7 @@ namespace truebox {
 struct PredictOptions {
   std::size_t elements = 6000;  ///< of the fine grid, about
   FormFactorOptions form_factors;
+  FindExchange find_exchange;  ///< instead of the full matrix of form factors; may be empty
   SolveOptions solve;
   bool error_shares = false;   ///< solve the middle grid twice, to tell what part is the rays'
   bool sensitivities = false;  ///< of the fine grid to each material's reflectance
@@ -41,6 +43,7 @@ struct GridSolution {
   BandMatrix indirect;   ///< mean irradiance after one reflection or more
   BandMatrix reflected;  ///< rho (direct + indirect); radiosity is this plus own exitance
   FormFactorSummary form_factors;
+  std::optional<LinkSummary> links;  ///< where the exchange is hierarchical
   SolveSummary solve;
   /// d (mean radiosity of each surface) / d rho of each material: surfaces x bands a material.
   std::vector<BandMatrix> radiosity_by_reflectance;
@@ -75,6 +78,7 @@ class Prediction {
   const Requirements& needs() const { return needs_; }
   const GridSolution& fine() const { return levels_[0]->solution; }
   const GridSolution& coarse() const { return levels_[1]->solution; }
+  const GridSolution& coarsest() const { return levels_[2]->solution; }
   const Visibility& visibility() const { return *visibility_; }
   SolveOutcome outcome() const;
   /// Nothing unless options.error_shares.
@@ -125,8 +129,8 @@ class Prediction {
   };
 
   std::unique_ptr<Level> solve_level(double edge_m, int split, const PredictOptions& options) const;
-  void differentiate(const FormFactors& factors, const BandMatrix& rho, const SolveOptions& options,
-                     GridSolution& grid) const;
+  void differentiate(const ExchangeOperator& exchange, const BandMatrix& rho,
+                     const SolveOptions& options, GridSolution& grid) const;
   ErrorShares find_error_shares(const Level& resampled) const;
   /// Bound of the indirect irradiance within each element, found when first asked for.
   const BandMatrix& indirect_bound() const;
