@@ -32,6 +32,7 @@ void add_compare_command(CLI::App& program, Action& chosen);
 void add_demo_command(CLI::App& program, Action& chosen);
 void add_export_command(CLI::App& program, Action& chosen);
 void add_fit_command(CLI::App& program, Action& chosen);
+void add_generate_command(CLI::App& program, Action& chosen);
 void add_plan_command(CLI::App& program, Action& chosen);
 void add_probe_command(CLI::App& program, Action& chosen);
 void add_render_command(CLI::App& program, Action& chosen);

@@ -47,10 +47,18 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       ->check(CLI::IsMember(methods));
   command
       .add_option("--form-factors", a.form_factors,
-                  "what tells how much of a pair is hidden: ray-casting, or exact-visibility "
-                  "(shadow outlines, no noise)")
+                  "ray-casting or exact-visibility (shadow outlines, no noise): a matrix of all "
+                  "pairs; hierarchical: links between groups of elements, for many elements")
       ->capture_default_str()
-      ->check(CLI::IsMember({"ray-casting", "exact-visibility"}));
+      ->check(CLI::IsMember({"ray-casting", "exact-visibility", "hierarchical"}));
+  command
+      .add_option("--link-tolerance", a.link_tolerance,
+                  "hierarchical: share of the mean irradiance that links may leave out, rms")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-6, 0.5));
+  command.add_option("--memory", a.memory_MiB, "MiB that form factors or links may take")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 1 << 24));
   command.add_option("--solver-bound", a.relative_bound, "stop at this relative error bound")
       ->capture_default_str()
       ->check(CLI::Range(1e-13, 0.5));
@@ -95,16 +103,25 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                   static_cast<std::size_t>(a.threads));
   PredictOptions options;
+  options.progress = terminal_progress(a.quiet);
   options.elements = a.elements;
   options.form_factors.rays = a.rays;
   if (a.form_factors == "exact-visibility")
     options.form_factors.method = FormFactorMethod::exact_visibility;
   options.solve_grid = a.solve_grid;
+  options.watch_finest = a.watch_finest;
+  options.form_factors.memory_limit_bytes = a.memory_MiB << 20;
+  if (a.form_factors == "hierarchical") {
+    const HierarchyOptions hierarchy{a.link_tolerance, a.memory_MiB << 20};
+    require_memory(a.elements, hierarchy);
+    if (options.progress)
+      fmt::print(stderr, "memory: about {} MiB\n", estimated_bytes(a.elements, hierarchy) >> 20);
+    options.find_exchange = hierarchical_exchange(hierarchy);
+  }
   options.solve.method = method_of_name(a.method);
   options.solve.relative_bound = a.relative_bound;
   options.error_shares = a.error_shares;
   options.sensitivities = a.sensitivities;
-  options.progress = terminal_progress(a.quiet);
   const auto start = std::chrono::steady_clock::now();
   if (a.target_error.empty()) {
     predicted->prediction = std::make_unique<Prediction>(predicted->scene, options);
@@ -128,11 +145,21 @@ std::string describe(const Predicted& p) {
                                  p.scene.bands.size(), p.seconds);
   for (const auto& reason : p.prediction->needs().reasons) text += "  " + reason + "\n";
   if (!p.prediction->needs().interreflection) return text;
-  text += fmt::format("  form factors: {} pairs without anything between, {} hidden, {} {}\n",
-                      f.pairs_unoccluded, f.pairs_hidden, f.pairs_sampled,
-                      f.method == FormFactorMethod::exact_visibility
-                          ? "partly hidden, by outlines of the shadows"
-                          : fmt::format("sampled with {} rays", f.rays));
+  if (grid.links)
+    text += fmt::format(
+        "  links: {} between {} elements ({:.1f} an element), {} groups hidden, {} rays; {:.0f} "
+        "MiB; "
+        "they leave out {:.1e} rms (estimated)\n",
+        grid.links->links, grid.links->elements,
+        static_cast<double>(grid.links->links) / static_cast<double>(grid.links->elements),
+        grid.links->hidden, f.rays, static_cast<double>(grid.links->bytes) / (1 << 20),
+        grid.links->relative_error);
+  else
+    text += fmt::format("  form factors: {} pairs without anything between, {} hidden, {} {}\n",
+                        f.pairs_unoccluded, f.pairs_hidden, f.pairs_sampled,
+                        f.method == FormFactorMethod::exact_visibility
+                            ? "partly hidden, by outlines of the shadows"
+                            : fmt::format("sampled with {} rays", f.rays));
   if (f.buried_patches > 0)
     text +=
         fmt::format("  {} elements lie under another surface and see nothing\n", f.buried_patches);

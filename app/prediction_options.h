@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "hierarchy/hierarchical_exchange.h"
 #include "scene/scene.h"
 #include "transport/predict_to_target.h"
 
@@ -20,7 +21,10 @@ struct PredictionArguments {
   std::size_t elements = PredictOptions{}.elements;
   int rays = FormFactorOptions{}.rays;
   std::string method = "krylov";
+  /// "ray-casting" or "exact-visibility" for a matrix, or "hierarchical": links between groups
   std::string form_factors = "ray-casting";
+  double link_tolerance = HierarchyOptions{}.relative_tolerance;
+  std::size_t memory_MiB = 8192;
   double relative_bound = SolveOptions{}.relative_bound;
   std::string target_error;  ///< "0.5%" or "0.005": chooses elements and solver bound
   bool error_shares = false, sensitivities = false;  ///< as in PredictOptions

@@ -33,11 +33,11 @@ class Snapshots {
       weight_.push_back(linear_bt709(weight));
   }
 
-  void look_at(const GridTask& task, const GridSolution& grid) {
+  void look_at(const PatchMesh& mesh, const BandMatrix& source) {
     const Camera camera(camera_);
-    const Visibility visibility(grid.mesh, task.scene);
-    const std::vector<char> all(grid.mesh.size(), 1);
-    const SmoothField finder(grid.mesh, all, BandMatrix::Zero(task.rho.rows(), 1));
+    const Visibility visibility(mesh, scene_);
+    const std::vector<char> all(mesh.size(), 1);
+    const SmoothField finder(mesh, all, BandMatrix::Zero(source.rows(), 1));
     element_.clear();
     for (int y = 0; y < camera.height_px(); ++y)
       for (int x = 0; x < camera.width_px(); ++x) {
@@ -47,10 +47,10 @@ class Snapshots {
             hit && hit->front ? static_cast<Index>(finder.find_patch(hit->piece, hit->point)) : -1);
       }
     surface_.clear();
-    for (const Patch& patch : grid.mesh.patches) surface_.push_back(grid.mesh.surface_of(patch));
+    for (const Patch& patch : mesh.patches) surface_.push_back(mesh.surface_of(patch));
     double white = 0.0;
-    for (Index i = 0; i < task.source.rows(); ++i) {
-      const LinearRgb rgb = colour(task.source, i, false);
+    for (Index i = 0; i < source.rows(); ++i) {
+      const LinearRgb rgb = colour(source, i, false);
       white = std::max({white, rgb[0], rgb[1], rgb[2]});
     }
     exposure_ = white > 0.0 ? 1.0 / white : 1.0;
@@ -103,19 +103,12 @@ class Snapshots {
 
 }  // namespace
 
-SolveGrid with_snapshots(const Scene& scene, const SnapshotOptions& options,
-                         const Progress& progress) {
-  auto snapshots = std::make_shared<Snapshots>(scene, options);
-  return [snapshots, progress](const GridTask& task, GridSolution& grid) {
-    if (!task.is_finest) {
-      solve_full_matrix(task, grid, progress);
-      return;
-    }
-    snapshots->look_at(task, grid);
-    SolveOptions watched = task.solve;
-    watched.on_progress = [&](double passes, const BandMatrix& b) { snapshots->take(passes, b); };
-    solve_full_matrix({task.scene, task.rho, task.source, task.form_factors, watched, true}, grid,
-                      progress);
+std::function<std::function<void(double, const BandMatrix&)>(const PatchMesh&, const BandMatrix&)>
+snapshots(const Scene& scene, const SnapshotOptions& options) {
+  auto taken = std::make_shared<Snapshots>(scene, options);
+  return [taken](const PatchMesh& mesh, const BandMatrix& source) {
+    taken->look_at(mesh, source);
+    return [taken](double passes, const BandMatrix& reflected) { taken->take(passes, reflected); };
   };
 }
 

@@ -18,10 +18,10 @@ struct SnapshotOptions {
   Observer observer;
 };
 
-/// A full matrix whose solver leaves PNGs and `snapshots.csv` (file, matrix passes) in the folder.
+/// For PredictOptions::watch_finest: PNGs and `snapshots.csv` (file, matrix passes) in the folder.
 /// Exposure is the same in all of them: white is the brightest light straight from the lamps.
 /// `scene` must outlive the result. InputError for an unknown camera.
-SolveGrid with_snapshots(const Scene& scene, const SnapshotOptions& options,
-                         const Progress& progress);
+std::function<std::function<void(double, const BandMatrix&)>(const PatchMesh&, const BandMatrix&)>
+snapshots(const Scene& scene, const SnapshotOptions& options);
 
 }  // namespace truebox::app

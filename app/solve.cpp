@@ -182,15 +182,12 @@ int solve_here(const SolveArguments& a, Ranks* ranks) {
 
 int solve(const SolveArguments& a) {
   if (!a.snapshots.empty()) {
-    if (a.distributed || a.prediction.sensitivities)
-      throw InputError("--snapshots", 0, "a plain solve",
-                       a.distributed ? "--distributed" : "--sensitivities");
+    if (a.distributed) throw InputError("--snapshots", 0, "one process", "--distributed");
     const Scene scene = read_scene(a.prediction.scene);
     SolveArguments watched = a;
     watched.snapshots.clear();
-    watched.prediction.solve_grid = with_snapshots(scene, {a.snapshots, a.camera, 384, observer()},
-                                                   terminal_progress(a.prediction.quiet));
-    const int code = solve_here(watched, nullptr);
+    watched.prediction.watch_finest = snapshots(scene, {a.snapshots, a.camera, 384, observer()});
+    const int code = solve(watched);
     fmt::print("Pictures of the way there: {}\n", a.snapshots);
     return code;
   }

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "transport/enclosure.h"
 #include "transport/exact_form_factors.h"
 
 namespace truebox::distributed {
@@ -72,12 +73,12 @@ DistributedRows::DistributedRows(const Partition& partition, const PatchMesh& me
   const Visibility visibility(mesh, scene);
   leave_out_buried(mesh, scene, visibility);
   const auto begin = static_cast<std::size_t>(partition.begin());
-  std::size_t rays = 0;
-  const double escaped = partition.sum(static_cast<double>(
-      escaping_rays(mesh, scene, visibility, usable_, options.seed, begin,
-                    begin + static_cast<std::size_t>(partition.local()), rays)));
-  summary_.closure_rays = static_cast<std::size_t>(partition.sum(static_cast<double>(rays)));
-  summary_.closed = summary_.closure_rays > 0 && escaped == 0.0;
+  const ClosureTest closure = test_closure(mesh, scene, visibility, usable_, options.seed, begin,
+                                           begin + static_cast<std::size_t>(partition.local()));
+  summary_.closure_rays =
+      static_cast<std::size_t>(partition.sum(static_cast<double>(closure.rays)));
+  const bool none_escaped = closure.closed || closure.rays == 0;
+  summary_.closed = partition.max(none_escaped ? 0.0 : 1.0) == 0.0 && summary_.closure_rays > 0;
   if (summary_.closed) repair();
   summary_.row_sum_max =
       partition.max(partition.local() > 0
@@ -128,7 +129,7 @@ void DistributedRows::leave_out_buried(const PatchMesh& mesh, const Scene& scene
   for (Index k = 0; k < partition_.local(); ++k) {
     const Index i = partition_.begin() + k;
     sees[static_cast<std::size_t>(k)] =
-        sums[k] >= kMayBeBuried * area_m2_[i] ||
+        sums[k] >= kNearlyEmptyRow * area_m2_[i] ||
         !is_buried(mesh, scene, visibility, static_cast<std::size_t>(i));
   }
   partition_.gather(sees, usable_);

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
+#include <utility>
 
 #include "mesh/smooth_field.h"
 #include "transport/form_factors.h"
@@ -25,10 +27,12 @@ class ExchangeOperator {
   Eigen::Index size() const { return area_m2().size(); }
 };
 
-/// Form factors that are held in memory; they must outlive the operator.
+/// Form factors that are held in memory: borrowed, they must outlive the operator, or its own.
 class DenseExchange final : public ExchangeOperator {
  public:
   explicit DenseExchange(const FormFactors& factors) : factors_(factors) {}
+  explicit DenseExchange(std::unique_ptr<FormFactors> factors)
+      : owned_(std::move(factors)), factors_(*owned_) {}
 
   const Eigen::VectorXd& area_m2() const override { return factors_.area_m2; }
   double row_sum_max() const override { return factors_.summary.row_sum_max; }
@@ -36,6 +40,7 @@ class DenseExchange final : public ExchangeOperator {
   void row(Eigen::Index i, Eigen::Ref<Eigen::VectorXd> values) const override;
 
  private:
+  std::unique_ptr<FormFactors> owned_;
   const FormFactors& factors_;
 };
 

@@ -4,14 +4,13 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <mutex>
-#include <numbers>
 #include <numeric>
 #include <stdexcept>
 
+#include "transport/enclosure.h"
 #include "transport/exact_form_factors.h"
 #include "transport/form_factor.h"
 
@@ -29,30 +28,6 @@ struct PatchShape {
 };
 
 constexpr int kSampleWindows = 64;
-
-std::uint64_t hash(std::uint64_t x) {  // splitmix64 (Steele et al. 2014)
-  x += 0x9e3779b97f4a7c15ull;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
-  return x ^ (x >> 31);
-}
-
-double unit_interval(std::uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1p-53; }
-
-// A point of a convex polygon, uniform for uniform (u, v): a triangle of the fan by area, then the
-// square-root map.
-Vec3 sample_polygon(const Polygon& p, double u, double v) {
-  double total = 0.0;
-  std::array<double, 16> area{};
-  const std::size_t fan = std::min<std::size_t>(p.size() - 2, area.size());
-  for (std::size_t i = 0; i < fan; ++i)
-    total += area[i] = (p[i + 1] - p[0]).cross(p[i + 2] - p[0]).norm();
-  double pick = u * total;
-  std::size_t i = 0;
-  while (i + 1 < fan && pick > area[i]) pick -= area[i++];
-  const double s = std::sqrt(std::clamp(pick / area[i], 0.0, 1.0));
-  return p[0] + s * ((1.0 - v) * (p[i + 1] - p[0]) + v * (p[i + 2] - p[0]));
-}
 
 class Builder {
  public:
@@ -92,7 +67,10 @@ class Builder {
     result.summary.pairs_sampled = partial_;
     result.summary.rays = rays_;
     mark_buried(result);
-    test_closure(result);
+    const ClosureTest closure =
+        test_closure(mesh_, scene_, visibility_, result.usable, options_.seed);
+    result.summary.closed = closure.closed;
+    result.summary.closure_rays = closure.rays;
     if (result.summary.closed) repair(result);
     result.summary.row_sum_max = 0.0;
     for (Eigen::Index i = 0; i < n; ++i)
@@ -227,20 +205,14 @@ class Builder {
     factors.usable.assign(mesh_.size(), 1);
     for (std::size_t i = 0; i < mesh_.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i);
-      if (factors.exchange_area_m2.col(row).sum() > 1e-4 * factors.area_m2[row]) continue;
-      if (!is_buried(mesh_, scene_, visibility_, i)) continue;
+      if (factors.exchange_area_m2.col(row).sum() > kEmptyRow * factors.area_m2[row] ||
+          !is_buried(mesh_, scene_, visibility_, i))
+        continue;
       factors.usable[i] = 0;
       ++factors.summary.buried_patches;
       factors.exchange_area_m2.col(row).setZero();
       factors.exchange_area_m2.row(row).setZero();
     }
-  }
-
-  void test_closure(FormFactors& factors) const {
-    const std::size_t escaped =
-        escaping_rays(mesh_, scene_, visibility_, factors.usable, options_.seed, 0, mesh_.size(),
-                      factors.summary.closure_rays);
-    factors.summary.closed = factors.summary.closure_rays > 0 && escaped == 0;
   }
 
   // Scales only sampled entries, S_ij <- x_i x_j S_ij, until each row sums to its area.
@@ -327,69 +299,6 @@ void require_memory(std::size_t elements, const FormFactorOptions& options) {
 
 namespace {
 
-// The underside of a block that stands on a floor: a surface of opposite normal at its centroid.
-bool lies_on_a_back(const PatchMesh& mesh, const Scene& scene, std::size_t i) {
-  const double tolerance_m = 1e-9 * scene.diameter_m();
-  const Vec3& normal = mesh.plane_of(mesh.patches[i]).normal;
-  const Vec3& centre = mesh.patches[i].centroid;
-  for (const Piece& piece : mesh.pieces) {
-    if (scene.surfaces[piece.surface].is_opening ||
-        std::abs(piece.plane.distance_m(centre)) > tolerance_m ||
-        piece.plane.normal.dot(normal) > -1.0 + 1e-9)
-      continue;
-    bool inside = true;
-    const std::size_t n = piece.polygon.size();
-    for (std::size_t k = 0; k < n && inside; ++k) {
-      const Vec3& a = piece.polygon[k];
-      inside = piece.plane.normal.cross(piece.polygon[(k + 1) % n] - a).dot(centre - a) > 0.0;
-    }
-    if (inside) return true;
-  }
-  return false;
-}
-
-}  // namespace
-
-bool is_buried(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
-               std::size_t i) {
-  const Vec3& normal = mesh.plane_of(mesh.patches[i]).normal;
-  const auto hit =
-      visibility.first_hit(mesh.patches[i].centroid + visibility.offset_m() * normal, normal, true);
-  return hit ? !hit->front : lies_on_a_back(mesh, scene, i);
-}
-
-std::size_t escaping_rays(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
-                          const std::vector<char>& usable, std::uint64_t seed, std::size_t begin,
-                          std::size_t end, std::size_t& rays) {
-  constexpr int kRaysEach = 16;
-  std::size_t escaped = 0;
-  Polygon polygon;
-  for (std::size_t i = begin; i < end; ++i) {
-    const Patch& patch = mesh.patches[i];
-    if (!usable[i] || scene.surfaces[mesh.surface_of(patch)].is_opening) continue;
-    mesh.polygon_of(patch, polygon);
-    const Vec3& n = mesh.plane_of(patch).normal;
-    const Vec3 t = n.unitOrthogonal(), b = n.cross(t);
-    std::uint64_t state = hash(seed + 77 + i);
-    const auto random = [&state] {
-      state = hash(state);
-      return unit_interval(state);
-    };
-    for (int k = 0; k < kRaysEach; ++k) {
-      const double r2 = random(), phi = 2.0 * std::numbers::pi * random();
-      const Vec3 direction =
-          std::sqrt(r2) * (std::cos(phi) * t + std::sin(phi) * b) + std::sqrt(1.0 - r2) * n;
-      const double u = random(), v = random();
-      const Vec3 origin = sample_polygon(polygon, u, v);
-      if (!visibility.first_hit(origin + visibility.offset_m() * n, direction, true)) ++escaped;
-    }
-    rays += kRaysEach;
-  }
-  return escaped;
-}
-
-namespace {
-
 FormFactors without_rays(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
                          const FormFactorOptions& options) {
   ExactFormFactorOptions exact_options;
@@ -407,16 +316,16 @@ FormFactors without_rays(const PatchMesh& mesh, const Scene& scene, const Visibi
   summary.pairs_sampled = exact.pairs_partial;
   for (Eigen::Index i = 0; i < result.size(); ++i) {
     char& usable = result.usable[static_cast<std::size_t>(i)];
-    if (result.exchange_area_m2.col(i).sum() < kMayBeBuried * result.area_m2[i])
+    if (result.exchange_area_m2.col(i).sum() < kNearlyEmptyRow * result.area_m2[i])
       usable = !is_buried(mesh, scene, visibility, static_cast<std::size_t>(i));
     if (usable) continue;
     ++summary.buried_patches;
     result.exchange_area_m2.col(i).setZero();
     result.exchange_area_m2.row(i).setZero();
   }
-  const std::size_t escaped = escaping_rays(mesh, scene, visibility, result.usable, options.seed, 0,
-                                            mesh.size(), summary.closure_rays);
-  summary.closed = summary.closure_rays > 0 && escaped == 0;
+  const ClosureTest closure = test_closure(mesh, scene, visibility, result.usable, options.seed);
+  summary.closed = closure.closed;
+  summary.closure_rays = closure.rays;
   if (summary.closed) {
     const ClosureReport report =
         repair_closure(result.exchange_area_m2, result.area_m2, result.usable, exact.partial,

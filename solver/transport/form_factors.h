@@ -43,18 +43,6 @@ struct FormFactorSummary {
   double row_sum_max = 0.0;           ///< max sum_j F_ij as used
 };
 
-/// Whether a patch lies under another surface, as a floor does under a block: along its normal the
-/// first thing is a back. Row sums cannot tell: at a block's outline slivers may be seen.
-bool is_buried(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
-               std::size_t patch);
-constexpr double kMayBeBuried = 0.1;  ///< of a full row: below that, look
-
-/// Whether cosine-distributed rays from the usable elements from `begin` to before `end` all meet
-/// a surface or an opening: 16 from each, added to `rays`. Returns how many escaped.
-std::size_t escaping_rays(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
-                          const std::vector<char>& usable, std::uint64_t seed, std::size_t begin,
-                          std::size_t end, std::size_t& rays);
-
 /// All pairs of a mesh as one symmetric matrix of exchange areas S_ij = A_i F_ij (m^2), n x n, so
 /// that reciprocity holds by construction.
 struct FormFactors {

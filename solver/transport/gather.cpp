@@ -9,6 +9,8 @@
 namespace truebox {
 namespace {
 
+constexpr std::uint32_t kNone = 0xffffffffu;
+
 bool any_beyond(std::span<const Vec3> polygon, const Plane& plane, double sign,
                 double tolerance_m) {
   return std::any_of(polygon.begin(), polygon.end(),
@@ -43,20 +45,45 @@ void for_each_gauss_point(const Polygon& polygon, const Visit& visit) {
 
 Gather::Gather(const PatchMesh& mesh, const Scene& scene, bool occlusion)
     : mesh_(mesh), scene_(scene), tolerance_m_(1e-9 * scene.diameter_m()) {
+  blocker_of_.assign(mesh.pieces.size(), kNone);
   for (std::uint32_t p = 0; p < mesh.pieces.size(); ++p) {
     const Surface& surface = scene.surfaces[mesh.pieces[p].surface];
     if (surface.is_opening) continue;
     if (scene.material_of(surface).emits()) luminous_pieces_.push_back(p);
     // A piece with the whole scene on one side cannot stand between two points of it.
     bool front = false, behind = false;
-    for (const Piece& other : mesh.pieces) {
-      front |= any_beyond(other.polygon, mesh.pieces[p].plane, 1.0, tolerance_m_);
-      behind |= any_beyond(other.polygon, mesh.pieces[p].plane, -1.0, tolerance_m_);
+    for (std::size_t q = 0; q < mesh.pieces.size() && !(front && behind); ++q) {
+      const Polygon& other = mesh.pieces[q].polygon;
+      front = front || any_beyond(other, mesh.pieces[p].plane, 1.0, tolerance_m_);
+      behind = behind || any_beyond(other, mesh.pieces[p].plane, -1.0, tolerance_m_);
     }
     if (!occlusion || !front || !behind) continue;
     blockers_.push_back({mesh.pieces[p].polygon, mesh.pieces[p].plane});
+    blocker_of_[p] = static_cast<std::uint32_t>(blocker_piece_.size());
     blocker_piece_.push_back(p);
   }
+}
+
+void Gather::add_if_between(std::size_t blocker, const Vec3& point, const Plane& horizon,
+                            std::span<const Vec3> polygon, std::uint32_t piece,
+                            Scratch& scratch) const {
+  if (blocker_piece_[blocker] != piece &&
+      may_block(blockers_[blocker], point, polygon, mesh_.pieces[piece].plane, tolerance_m_) &&
+      any_beyond(blockers_[blocker].polygon, horizon, 1.0, tolerance_m_))
+    scratch.blockers.push_back(&blockers_[blocker]);
+}
+
+// The part of the polygon in front of the element, less the shadows of scratch.blockers.
+double Gather::factor_of_visible_parts(const Vec3& point, const Vec3& normal,
+                                       std::span<const Vec3> polygon, const Plane& plane,
+                                       Scratch& scratch) const {
+  if (scratch.blockers.empty()) return point_to_polygon(point, normal, polygon);
+  clip(polygon, {normal, normal.dot(point)}, 1e-13 * (polygon[0] - point).norm(), scratch.polygon);
+  if (scratch.polygon.empty()) return 0.0;
+  double factor = 0.0;
+  for (const Polygon& part : scratch.parts(point, scratch.polygon, plane, scratch.blockers))
+    factor += point_to_polygon(point, normal, part);
+  return factor;
 }
 
 double Gather::visible_factor(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon,
@@ -67,16 +94,34 @@ double Gather::visible_factor(const Vec3& point, const Vec3& normal, std::span<c
   if (!any_beyond(polygon, horizon, 1.0, tolerance_m_)) return 0.0;
   scratch.blockers.clear();
   for (std::size_t b = 0; b < blockers_.size(); ++b)
-    if (blocker_piece_[b] != piece &&
-        may_block(blockers_[b], point, polygon, plane, tolerance_m_) &&
-        any_beyond(blockers_[b].polygon, horizon, 1.0, tolerance_m_))
-      scratch.blockers.push_back(&blockers_[b]);
-  if (scratch.blockers.empty()) return point_to_polygon(point, normal, polygon);
-  clip(polygon, horizon, 1e-13 * (polygon[0] - point).norm(), scratch.polygon);
-  if (scratch.polygon.empty()) return 0.0;
+    add_if_between(b, point, horizon, polygon, piece, scratch);
+  return factor_of_visible_parts(point, normal, polygon, plane, scratch);
+}
+
+double Gather::mean_factor(std::uint32_t patch_index, std::uint32_t luminaire,
+                           std::span<const std::uint32_t> between, Scratch& scratch) const {
+  const Patch& patch = mesh_.patches[patch_index];
+  const Plane& plane = mesh_.plane_of(patch);
+  const Piece& piece = mesh_.pieces[luminaire];
+  Polygon polygon;
+  mesh_.polygon_of(patch, polygon);
+  if (luminaire == patch.piece || !any_beyond(piece.polygon, plane, 1.0, tolerance_m_) ||
+      !any_beyond(polygon, piece.plane, 1.0, tolerance_m_))
+    return 0.0;
+  if (between.empty())
+    return exchange_area_m2(PlanarPolygon(polygon), PlanarPolygon(piece.polygon), 1e-12) /
+           patch.area_m2;
   double factor = 0.0;
-  for (const Polygon& part : scratch.parts(point, scratch.polygon, plane, scratch.blockers))
-    factor += point_to_polygon(point, normal, part);
+  for_each_gauss_point(polygon, [&](const Vec3& point, double weight) {
+    if (piece.plane.distance_m(point) <= tolerance_m_) return;
+    const Plane horizon{plane.normal, plane.normal.dot(point)};
+    scratch.blockers.clear();
+    for (std::uint32_t p : between)
+      if (blocker_of_[p] != kNone)
+        add_if_between(blocker_of_[p], point, horizon, piece.polygon, luminaire, scratch);
+    factor +=
+        weight * factor_of_visible_parts(point, plane.normal, piece.polygon, piece.plane, scratch);
+  });
   return factor;
 }
 
@@ -88,45 +133,6 @@ void Gather::add_direct(const Vec3& point, const Vec3& normal,
     if (factor > 0.0)
       irradiance +=
           factor * as_vector(scene_.material_of(scene_.surfaces[piece.surface]).exitance.values);
-  }
-}
-
-bool Gather::may_come_between(const Blocker& blocker, std::span<const Vec3> a, const Plane& plane_a,
-                              std::span<const Vec3> b, const Plane& plane_b) const {
-  const auto beyond = [&](std::span<const Vec3> polygon, double sign) {
-    return any_beyond(polygon, blocker.plane, sign, tolerance_m_);
-  };
-  if (!(beyond(a, 1.0) || beyond(b, 1.0)) || !(beyond(a, -1.0) || beyond(b, -1.0))) return false;
-  return any_beyond(blocker.polygon, plane_a, 1.0, tolerance_m_) &&
-         any_beyond(blocker.polygon, plane_b, 1.0, tolerance_m_);
-}
-
-void Gather::add_mean_direct(std::uint32_t patch_index, Eigen::Ref<Eigen::VectorXd> irradiance,
-                             Scratch& scratch) const {
-  const Patch& patch = mesh_.patches[patch_index];
-  const Plane& plane = mesh_.plane_of(patch);
-  Polygon polygon;
-  mesh_.polygon_of(patch, polygon);
-  for (std::uint32_t p : luminous_pieces_) {
-    const Piece& piece = mesh_.pieces[p];
-    if (p == patch.piece || !any_beyond(piece.polygon, plane, 1.0, tolerance_m_) ||
-        !any_beyond(polygon, piece.plane, 1.0, tolerance_m_))
-      continue;
-    bool blocked = false;
-    for (std::size_t b = 0; b < blockers_.size() && !blocked; ++b)
-      blocked = blocker_piece_[b] != p && blocker_piece_[b] != patch.piece &&
-                may_come_between(blockers_[b], polygon, plane, piece.polygon, piece.plane);
-    double factor = 0.0;
-    if (!blocked) {
-      factor = exchange_area_m2(PlanarPolygon(polygon), PlanarPolygon(piece.polygon), 1e-12) /
-               patch.area_m2;
-    } else {
-      for_each_gauss_point(polygon, [&](const Vec3& point, double weight) {
-        factor += weight * visible_factor(point, plane.normal, piece.polygon, p, scratch);
-      });
-    }
-    irradiance +=
-        factor * as_vector(scene_.material_of(scene_.surfaces[piece.surface]).exitance.values);
   }
 }
 

@@ -28,14 +28,14 @@ class Gather {
   double visible_factor(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon,
                         std::uint32_t piece, Scratch& scratch) const;
 
+  /// Mean visible factor from an element to a whole luminous piece, where no other pieces than
+  /// `between` may block: closed form if none, otherwise 4 x 4 Gauss points of exact visibility.
+  double mean_factor(std::uint32_t patch, std::uint32_t luminaire,
+                     std::span<const std::uint32_t> between, Scratch& scratch) const;
+
   /// Adds the direct irradiance of all luminaires, W m^-2 nm^-1, one value a band of the scene.
   void add_direct(const Vec3& point, const Vec3& normal, Eigen::Ref<Eigen::VectorXd> irradiance,
                   Scratch& scratch) const;
-
-  /// Mean direct irradiance of an element: closed form where nothing can stand between, otherwise
-  /// 4 x 4 Gauss points of exact visibility.
-  void add_mean_direct(std::uint32_t patch, Eigen::Ref<Eigen::VectorXd> irradiance,
-                       Scratch& scratch) const;
 
   /// Radiosity (one value a band) that leaves a point of an element; `depth` says how often the
   /// element was split to get there.
@@ -54,13 +54,18 @@ class Gather {
   void add_near_field(const Vec3& point, const Vec3& normal, const Polygon& polygon,
                       std::uint32_t patch, int depth, const SourceAt& source_at, Scratch& scratch,
                       Eigen::Ref<Eigen::RowVectorXd> sum) const;
-  bool may_come_between(const Blocker& blocker, std::span<const Vec3> a, const Plane& plane_a,
-                        std::span<const Vec3> b, const Plane& plane_b) const;
+  double factor_of_visible_parts(const Vec3& point, const Vec3& normal,
+                                 std::span<const Vec3> polygon, const Plane& plane,
+                                 Scratch& scratch) const;
+  void add_if_between(std::size_t blocker, const Vec3& point, const Plane& horizon,
+                      std::span<const Vec3> polygon, std::uint32_t piece, Scratch& scratch) const;
 
   const PatchMesh& mesh_;
   const Scene& scene_;
   std::vector<Blocker> blockers_;
   std::vector<std::uint32_t> blocker_piece_;
+  std::vector<std::uint32_t>
+      blocker_of_;  ///< of each piece, into blockers_; kNone if it blocks nothing
   std::vector<std::uint32_t> luminous_pieces_;
   double tolerance_m_ = 0.0;
 };

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "transport/prediction.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 
+#include "transport/direct_light.h"
 #include "transport/grid_difference.h"
 #include "transport/sensitivity.h"
 
@@ -28,32 +26,17 @@ BandMatrix reflectance_of(const PatchMesh& mesh, const Scene& scene) {
   return rho;
 }
 
-BandMatrix mean_direct(const PatchMesh& mesh, const Gather& gather, Index bands) {
-  BandMatrix direct = BandMatrix::Zero(static_cast<Index>(mesh.size()), bands);
-  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.size())),
-                    [&](const auto& range) {
-                      Gather::Scratch scratch;
-                      Eigen::VectorXd sum(bands);
-                      for (std::uint32_t i = range.begin(); i < range.end(); ++i) {
-                        sum.setZero();
-                        gather.add_mean_direct(i, sum, scratch);
-                        direct.row(i) = sum.transpose();
-                      }
-                    });
-  return direct;
+FoundExchange full_matrix(const ExchangeRequest& request) {
+  auto factors = std::make_unique<FormFactors>(
+      form_factors(request.mesh, request.scene, request.visibility, request.options));
+  FoundExchange found;
+  found.usable = factors->usable;
+  found.summary = factors->summary;
+  found.exchange = std::make_unique<DenseExchange>(std::move(factors));
+  return found;
 }
 
 }  // namespace
-
-FormFactors solve_full_matrix(const GridTask& task, GridSolution& grid, const Progress& progress) {
-  const Visibility visibility(grid.mesh, task.scene);
-  FormFactors factors = form_factors(grid.mesh, task.scene, visibility, task.form_factors);
-  grid.usable = factors.usable;
-  grid.form_factors = factors.summary;
-  grid.solve = solve_radiosity(factors, task.rho, task.source, task.solve, grid.reflected, progress,
-                               &grid.indirect);
-  return factors;
-}
 
 Prediction::Prediction(const Scene& scene, const PredictOptions& options)
     : scene_(&scene), needs_(requirements(scene)) {
@@ -61,7 +44,7 @@ Prediction::Prediction(const Scene& scene, const PredictOptions& options)
   distinct_scene_ = in_bands(scene, needs_.distinct_bands);
   const double edge_m = edge_for_count(scene, std::max<std::size_t>(1, options.elements / 16));
   // The finest grid decides; better told before the others are solved.
-  if (needs_.interreflection && !options.solve_grid)
+  if (needs_.interreflection && !options.find_exchange && !options.solve_grid)
     require_memory(uniform_mesh(distinct_scene_, edge_m, kFinestSplit).size(),
                    options.form_factors);
   for (int k = 2; k >= 0; --k) levels_[k] = solve_level(edge_m, kFinestSplit - k, options);
@@ -82,7 +65,10 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   grid.mesh = uniform_mesh(distinct_scene_, edge_m, split);
   const auto bands = static_cast<Index>(distinct_scene_.bands.size());
   level->gather = std::make_unique<Gather>(grid.mesh, distinct_scene_, needs_.occlusion);
-  grid.direct = mean_direct(grid.mesh, *level->gather, bands);
+  const ElementTree tree = element_tree(grid.mesh);
+  const ShaftCulling culling(grid.mesh, distinct_scene_, needs_.occlusion);
+  grid.direct =
+      mean_direct(grid.mesh, distinct_scene_, *level->gather, tree, culling, options.progress);
   const BandMatrix rho = reflectance_of(grid.mesh, distinct_scene_);
   const BandMatrix source = rho.cwiseProduct(grid.direct);
   if (!needs_.interreflection) {
@@ -97,15 +83,24 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   factor_options.occlusion = needs_.occlusion;
   factor_options.seed = options.form_factors.seed + static_cast<std::uint64_t>(split);
   factor_options.progress = options.progress;
-  const GridTask task{distinct_scene_, rho,           source,
-                      factor_options,  options.solve, split == kFinestSplit};
   if (options.solve_grid) {
-    options.solve_grid(task, grid);
+    options.solve_grid({distinct_scene_, rho, source, factor_options, options.solve}, grid);
     return level;
   }
-  const FormFactors factors = solve_full_matrix(task, grid, options.progress);
+  SolveOptions solve_options = options.solve;
+  if (options.watch_finest && split == kFinestSplit)
+    solve_options.on_progress = options.watch_finest(grid.mesh, source);
+  const Visibility visibility(grid.mesh, distinct_scene_);
+  const FindExchange find = options.find_exchange ? options.find_exchange : full_matrix;
+  FoundExchange found =
+      find({grid.mesh, distinct_scene_, visibility, culling, rho, source, factor_options});
+  grid.usable = std::move(found.usable);
+  grid.form_factors = found.summary;
+  grid.links = found.links;
+  grid.solve = solve_radiosity(*found.exchange, rho, source, solve_options, grid.reflected,
+                               options.progress, &grid.indirect);
   if (options.sensitivities && split == kFinestSplit)
-    differentiate(factors, rho, options.solve, grid);
+    differentiate(*found.exchange, rho, options.solve, grid);
   return level;
 }
 
@@ -123,9 +118,8 @@ SolveOutcome Prediction::outcome() const {
   return SolveOutcome::converged;
 }
 
-void Prediction::differentiate(const FormFactors& factors, const BandMatrix& rho,
+void Prediction::differentiate(const ExchangeOperator& exchange, const BandMatrix& rho,
                                const SolveOptions& options, GridSolution& grid) const {
-  const DenseExchange exchange(factors);
   const SolvedSystem system{exchange, rho, grid.direct, grid.indirect};
   const auto surfaces = static_cast<Index>(distinct_scene_.surfaces.size());
   for (std::size_t m = 0; m < distinct_scene_.materials.size(); ++m) {

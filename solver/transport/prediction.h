@@ -10,6 +10,7 @@
 #include "mesh/smooth_field.h"
 #include "scene/requirements.h"
 #include "transport/form_factors.h"
+#include "transport/found_exchange.h"
 #include "transport/gather.h"
 #include "transport/solve_radiosity.h"
 #include "transport/visibility.h"
@@ -25,7 +26,6 @@ struct GridTask {
   const BandMatrix& source;
   const FormFactorOptions& form_factors;
   const SolveOptions& solve;
-  bool is_finest = false;
 };
 
 /// Finds form factors and solution of one grid: fills all of it but mesh and direct light.
@@ -34,6 +34,7 @@ using SolveGrid = std::function<void(const GridTask& task, GridSolution& grid)>;
 struct PredictOptions {
   std::size_t elements = 6000;  ///< of the fine grid, about
   FormFactorOptions form_factors;
+  FindExchange find_exchange;  ///< instead of the full matrix of form factors; may be empty
   SolveOptions solve;
   bool error_shares = false;   ///< solve the middle grid twice, to tell what part is the rays'
   bool sensitivities = false;  ///< of the fine grid to each material's reflectance
@@ -57,14 +58,11 @@ struct GridSolution {
   BandMatrix indirect;   ///< mean irradiance after one reflection or more
   BandMatrix reflected;  ///< rho (direct + indirect); radiosity is this plus own exitance
   FormFactorSummary form_factors;
+  std::optional<LinkSummary> links;  ///< where the exchange is hierarchical
   SolveSummary solve;
   /// d (mean radiosity of each surface) / d rho of each material: surfaces x bands a material.
   std::vector<BandMatrix> radiosity_by_reflectance;
 };
-
-/// A SolveGrid: one full matrix of form factors, here. Returns it.
-FormFactors solve_full_matrix(const GridTask& task, GridSolution& grid,
-                              const Progress& progress = {});
 
 /// Irradiance (W m^-2 nm^-1) in each band and what it can be wrong by.
 struct BoundedIrradiance {
@@ -95,6 +93,7 @@ class Prediction {
   const Requirements& needs() const { return needs_; }
   const GridSolution& fine() const { return levels_[0]->solution; }
   const GridSolution& coarse() const { return levels_[1]->solution; }
+  const GridSolution& coarsest() const { return levels_[2]->solution; }
   const Visibility& visibility() const { return *visibility_; }
   SolveOutcome outcome() const;
   /// Nothing unless options.error_shares.
@@ -145,8 +144,8 @@ class Prediction {
   };
 
   std::unique_ptr<Level> solve_level(double edge_m, int split, const PredictOptions& options) const;
-  void differentiate(const FormFactors& factors, const BandMatrix& rho, const SolveOptions& options,
-                     GridSolution& grid) const;
+  void differentiate(const ExchangeOperator& exchange, const BandMatrix& rho,
+                     const SolveOptions& options, GridSolution& grid) const;
   ErrorShares find_error_shares(const Level& resampled) const;
   /// Bound of the indirect irradiance within each element, found when first asked for.
   const BandMatrix& indirect_bound() const;

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "hierarchy/hierarchical_exchange.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <stdexcept>
+
+#include "hierarchy/linked_exchange.h"
+#include "transport/enclosure.h"
+#include "transport/solve_radiosity.h"
+
+namespace truebox {
+namespace {
+
+using Eigen::Index;
+
+// Errors of links fall like the root of the error allowed to each (measured on three rooms).
+constexpr double kFirstShare = 4.0;   // the first links are about this much coarser
+constexpr double kFinestStep = 1e-3;  // of the error of a link, from the first links to the second
+constexpr double kLinksOfAnElement = 40.0;                    // at a tolerance of 1e-2, in rooms
+constexpr std::size_t kBytesOfAnElement = 2600;               // tree, points of groups, kernels
+constexpr std::size_t kBytesOfALink = sizeof(Link) * 2 + 16;  // while two lists and halves are held
+constexpr double kLeastRow = 0.1;  // rows that hold less than this are not scaled up to 1
+
+double processor_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+std::string mebibytes(double bytes) {
+  return std::to_string(static_cast<std::size_t>(bytes / (1 << 20))) + " MiB";
+}
+
+class Finder {
+ public:
+  Finder(const HierarchyOptions& options, const ExchangeRequest& request)
+      : options_(options), request_(request), area_(static_cast<Index>(request.mesh.size())) {
+    for (Index i = 0; i < area_.size(); ++i)
+      area_[i] = request.mesh.patches[static_cast<std::size_t>(i)].area_m2;
+  }
+
+  FoundExchange find() {
+    const double start_s = processor_s();
+    const ElementTree tree = usable_tree();
+    const LinkRefinement refinement(request_.mesh, request_.visibility, tree, request_.culling,
+                                    request_.options.seed);
+    // First links: light as if spread evenly.
+    const double tolerance = options_.relative_tolerance;
+    double of_a_link = std::pow(kFirstShare * tolerance, 2) / kFirstShare;
+    const BandMatrix guess = ambient_guess();
+    Links links = refine(refinement, tree, guess, of_a_link);
+    const double first_estimate = std::sqrt(links.sum_of_squares);
+    BandMatrix first_irradiance = BandMatrix::Zero(guess.rows(), guess.cols());
+    LinkedExchange first_exchange(tree, area_, links.links);
+    test_enclosure();
+    close(first_exchange);
+    const BandMatrix first = solved(first_exchange, first_irradiance);
+    // Second links: they know the light.
+    double worth = 1.0;
+    if (first_estimate > 0.0)
+      of_a_link *= std::clamp(std::pow(tolerance / first_estimate, 2), kFinestStep, 1.0);
+    links = refine(refinement, tree, first, of_a_link);
+    auto exchange = std::make_unique<LinkedExchange>(tree, area_, links.links);
+    close(*exchange);
+    found_.exchange = std::move(exchange);
+    if (first_estimate > 0.0) {
+      BandMatrix irradiance;
+      solved(*found_.exchange, irradiance);
+      worth = std::max(1.0, relative_difference(first_irradiance, irradiance) / first_estimate);
+    }
+    FormFactorSummary& summary = found_.summary;
+    summary.rays = links.rays;
+    summary.pairs_hidden = links.hidden;
+    summary.pairs_sampled = links.sampled;
+    summary.pairs_unoccluded = links.links.size() - std::min(links.links.size(), links.sampled);
+    found_.links = LinkSummary{request_.mesh.size(),
+                               links.links.size(),
+                               links.tried,
+                               links.hidden,
+                               bytes_,
+                               processor_s() - start_s,
+                               tolerance,
+                               worth * std::sqrt(links.sum_of_squares)};
+    return std::move(found_);
+  }
+
+ private:
+  ElementTree usable_tree() {
+    const PatchMesh& mesh = request_.mesh;
+    found_.usable =
+        usable_patches(mesh, request_.scene, request_.visibility, request_.options.seed);
+    std::vector<std::uint32_t> patches;
+    for (std::uint32_t i = 0; i < mesh.size(); ++i)
+      if (found_.usable[i]) patches.push_back(i);
+    found_.summary.buried_patches = mesh.size() - patches.size();
+    if (patches.empty()) patches.push_back(0);
+    return element_tree(mesh, std::move(patches));
+  }
+
+  // Each band's flux, spread evenly: B = M + rho E with E = mean(M) / (1 - mean(rho)).
+  BandMatrix ambient_guess() const {
+    const Eigen::RowVectorXd source = area_.transpose() * request_.source / area_.sum();
+    const Eigen::RowVectorXd rho = area_.transpose() * request_.rho / area_.sum();
+    const Eigen::RowVectorXd irradiance = source.array() / (1.0 - rho.array());
+    return request_.source + request_.rho * irradiance.asDiagonal();
+  }
+
+  Links refine(const LinkRefinement& refinement, const ElementTree& tree,
+               const BandMatrix& radiosity, double of_a_link) const {
+    LinkOptions options;
+    options.error_of_a_link = of_a_link;
+    options.rays = request_.options.rays;
+    options.seed = request_.options.seed;
+    options.progress = request_.options.progress;
+    const std::size_t others = request_.mesh.size() * kBytesOfAnElement;
+    options.most_links =
+        (options_.memory_limit_bytes - std::min(options_.memory_limit_bytes, others)) /
+        kBytesOfALink;
+    const Eigen::VectorXd mean = (area_.transpose() * radiosity / area_.sum()).transpose();
+    try {
+      return refinement.refine(node_light(tree, area_, radiosity, mean), options);
+    } catch (const std::length_error& error) {
+      throw std::length_error(
+          std::to_string(request_.mesh.size()) + " elements with a link tolerance of " +
+          std::to_string(options_.relative_tolerance) + " need " + error.what() +
+          ", which is all " + mebibytes(static_cast<double>(options_.memory_limit_bytes)) +
+          " hold; a tolerance twice as large takes about a third of the links");
+    }
+  }
+
+  BandMatrix solved(const ExchangeOperator& exchange, BandMatrix& irradiance) const {
+    SolveOptions options;
+    options.relative_bound = 0.1 * options_.relative_tolerance;
+    options.iteration_limit = 200;
+    BandMatrix radiosity;
+    solve_radiosity(exchange, request_.rho, request_.source, options, radiosity, {}, &irradiance);
+    return radiosity;
+  }
+
+  // Root mean square over the area, relative to the mean; worst band.
+  double relative_difference(const BandMatrix& a, const BandMatrix& b) const {
+    double worst = 0.0;
+    for (Index k = 0; k < a.cols(); ++k) {
+      const double mean = area_.dot(b.col(k)) / area_.sum();
+      if (mean > 0.0)
+        worst = std::max(
+            worst, std::sqrt(area_.dot((a.col(k) - b.col(k)).cwiseAbs2()) / area_.sum()) / mean);
+    }
+    return worst;
+  }
+
+  void test_enclosure() {
+    const ClosureTest closure = test_closure(request_.mesh, request_.scene, request_.visibility,
+                                             found_.usable, request_.options.seed);
+    found_.summary.closed = closure.closed;
+    found_.summary.closure_rays = closure.rays;
+  }
+
+  // Rows that sum to 1 in a closed scene, to no more than 1 in an open one.
+  void close(LinkedExchange& exchange) {
+    FormFactorSummary& summary = found_.summary;
+    bytes_ = exchange.bytes() + request_.mesh.size() * kBytesOfAnElement;
+    const Eigen::VectorXd rows = exchange.row_sums();
+    double weighted = 0.0, total = 0.0;
+    summary.closure_error_max = 0.0;
+    for (Index i = 0; i < rows.size(); ++i) {
+      if (!found_.usable[static_cast<std::size_t>(i)]) continue;
+      const double error = std::abs(rows[i] - 1.0);
+      summary.closure_error_max = std::max(summary.closure_error_max, error);
+      weighted += error * area_[i];
+      total += area_[i];
+    }
+    summary.closure_error_mean = weighted / total;
+    const auto repair = exchange.close_rows(kLeastRow, summary.closed);
+    summary.repair_max = repair.largest_change;
+    summary.closure_residual_max = repair.residual_max;
+    summary.row_sum_max = exchange.row_sum_max();
+  }
+
+  const HierarchyOptions& options_;
+  const ExchangeRequest& request_;
+  Eigen::VectorXd area_;
+  FoundExchange found_;
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace
+
+std::string HierarchyOptions::invalid() const {
+  if (!(relative_tolerance > 0.0 && relative_tolerance < 1.0))
+    return "the links' relative tolerance must lie in (0, 1)";
+  return {};
+}
+
+std::size_t estimated_bytes(std::size_t elements, const HierarchyOptions& options) {
+  const double links =
+      std::min(0.5 * static_cast<double>(elements),
+               kLinksOfAnElement * std::pow(1e-2 / options.relative_tolerance, 1.5));
+  return static_cast<std::size_t>(static_cast<double>(elements) *
+                                  (kBytesOfAnElement + links * kBytesOfALink));
+}
+
+void require_memory(std::size_t elements, const HierarchyOptions& options) {
+  const std::size_t bytes = estimated_bytes(elements, options);
+  if (bytes <= options.memory_limit_bytes) return;
+  const double fits = static_cast<double>(elements) *
+                      static_cast<double>(options.memory_limit_bytes) / static_cast<double>(bytes);
+  throw std::length_error(std::to_string(elements) + " elements and their links need about " +
+                          mebibytes(static_cast<double>(bytes)) + ", the limit is " +
+                          mebibytes(static_cast<double>(options.memory_limit_bytes)) +
+                          "; that fits about " + std::to_string(static_cast<std::size_t>(fits)) +
+                          " elements at this link tolerance");
+}
+
+FindExchange hierarchical_exchange(const HierarchyOptions& options) {
+  if (const std::string why = options.invalid(); !why.empty()) throw std::invalid_argument(why);
+  return [options](const ExchangeRequest& request) { return Finder(options, request).find(); };
+}
+
+}  // namespace truebox

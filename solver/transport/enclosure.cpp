@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "transport/enclosure.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+namespace truebox {
+namespace {
+
+// The underside of a block that stands on a floor: a surface of opposite normal at its centroid.
+bool lies_on_a_back(const PatchMesh& mesh, const Scene& scene, std::size_t i) {
+  const double tolerance_m = 1e-9 * scene.diameter_m();
+  const Vec3& normal = mesh.plane_of(mesh.patches[i]).normal;
+  const Vec3& centre = mesh.patches[i].centroid;
+  for (const Piece& piece : mesh.pieces) {
+    if (std::abs(piece.plane.distance_m(centre)) > tolerance_m ||
+        piece.plane.normal.dot(normal) > -1.0 + 1e-9 || scene.surfaces[piece.surface].is_opening)
+      continue;
+    bool inside = true;
+    const std::size_t n = piece.polygon.size();
+    for (std::size_t k = 0; k < n && inside; ++k) {
+      const Vec3& a = piece.polygon[k];
+      inside = piece.plane.normal.cross(piece.polygon[(k + 1) % n] - a).dot(centre - a) > 0.0;
+    }
+    if (inside) return true;
+  }
+  return false;
+}
+
+// Cosine-distributed rays from points spread evenly over an element.
+class ElementRays {
+ public:
+  ElementRays(const PatchMesh& mesh, const Visibility& visibility, std::size_t patch,
+              std::uint64_t seed)
+      : visibility_(visibility),
+        n_(mesh.plane_of(mesh.patches[patch]).normal),
+        t_(n_.unitOrthogonal()),
+        state_(hash(seed + 77 + patch)) {
+    mesh.polygon_of(mesh.patches[patch], polygon_);
+  }
+
+  std::optional<Visibility::Hit> cast() {
+    const double r2 = random(), phi = 2.0 * std::numbers::pi * random();
+    const Vec3 direction = std::sqrt(r2) * (std::cos(phi) * t_ + std::sin(phi) * n_.cross(t_)) +
+                           std::sqrt(1.0 - r2) * n_;
+    const double u = random(), v = random();
+    return visibility_.first_hit(sample_polygon(polygon_, u, v) + visibility_.offset_m() * n_,
+                                 direction, true);
+  }
+
+ private:
+  double random() {
+    state_ = hash(state_);
+    return unit_interval(state_);
+  }
+
+  const Visibility& visibility_;
+  Vec3 n_, t_;
+  std::uint64_t state_;
+  Polygon polygon_;
+};
+
+}  // namespace
+
+std::uint64_t hash(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15ull;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
+  return x ^ (x >> 31);
+}
+
+double unit_interval(std::uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1p-53; }
+
+Vec3 sample_polygon(const Polygon& p, double u, double v) {
+  double total = 0.0;
+  std::array<double, 16> area{};
+  const std::size_t fan = std::min<std::size_t>(p.size() - 2, area.size());
+  for (std::size_t i = 0; i < fan; ++i)
+    total += area[i] = (p[i + 1] - p[0]).cross(p[i + 2] - p[0]).norm();
+  double pick = u * total;
+  std::size_t i = 0;
+  while (i + 1 < fan && pick > area[i]) pick -= area[i++];
+  const double s = std::sqrt(std::clamp(pick / area[i], 0.0, 1.0));
+  return p[0] + s * ((1.0 - v) * (p[i + 1] - p[0]) + v * (p[i + 2] - p[0]));
+}
+
+bool is_buried(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+               std::size_t patch) {
+  const Vec3& normal = mesh.plane_of(mesh.patches[patch]).normal;
+  const auto hit = visibility.first_hit(
+      mesh.patches[patch].centroid + visibility.offset_m() * normal, normal, true);
+  return hit ? !hit->front : lies_on_a_back(mesh, scene, patch);
+}
+
+ClosureTest test_closure(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+                         const std::vector<char>& usable, std::uint64_t seed) {
+  return test_closure(mesh, scene, visibility, usable, seed, 0, mesh.size());
+}
+
+ClosureTest test_closure(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+                         const std::vector<char>& usable, std::uint64_t seed, std::size_t begin,
+                         std::size_t end) {
+  std::atomic<std::size_t> escaped{0}, cast{0};
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 64), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      if (!usable[i] || scene.surfaces[mesh.surface_of(mesh.patches[i])].is_opening) continue;
+      ElementRays rays(mesh, visibility, i, seed);
+      for (int k = 0; k < 16; ++k, ++cast)
+        if (!rays.cast()) ++escaped;
+    }
+  });
+  return {cast > 0 && escaped == 0, cast};
+}
+
+std::vector<char> usable_patches(const PatchMesh& mesh, const Scene& scene,
+                                 const Visibility& visibility, std::uint64_t seed) {
+  std::vector<char> usable(mesh.size(), 1);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.size(), 64), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      ElementRays rays(mesh, visibility, i, seed);
+      bool sees = false;
+      for (int k = 0; k < 8 && !sees; ++k) {
+        const auto hit = rays.cast();
+        sees = hit && hit->front;
+      }
+      usable[i] = sees || !is_buried(mesh, scene, visibility, i) ? 1 : 0;
+    }
+  });
+  return usable;
+}
+
+}  // namespace truebox

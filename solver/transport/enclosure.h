@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mesh/patch_mesh.h"
+#include "transport/visibility.h"
+
+namespace truebox {
+
+std::uint64_t hash(std::uint64_t x);       ///< splitmix64 (Steele et al. 2014)
+double unit_interval(std::uint64_t bits);  ///< the upper 53 bits as a number in [0, 1)
+
+/// A point of a convex polygon, uniform for uniform (u, v): a triangle of the fan by area, then the
+/// square-root map.
+Vec3 sample_polygon(const Polygon& polygon, double u, double v);
+
+/// Whether an element whose row of form factors is empty lies under another surface: a ray from its
+/// centroid meets the back of a surface at once, or a surface of opposite normal lies on it.
+bool is_buried(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+               std::size_t patch);
+
+/// One flag an element, 0 where it is buried, from rays alone: that of `is_buried`, and eight
+/// cosine-distributed ones that meet no lit side either. For methods that need to know before they
+/// have rows.
+std::vector<char> usable_patches(const PatchMesh& mesh, const Scene& scene,
+                                 const Visibility& visibility, std::uint64_t seed);
+
+/// Row sums below this share of the area make an element ask `is_buried`.
+inline constexpr double kEmptyRow = 1e-4;
+/// The same where rows are exact: at a block's outline what lies under it sees slivers.
+inline constexpr double kNearlyEmptyRow = 0.1;
+
+/// Cosine-distributed rays, 16 from every usable element: the scene is closed if none escapes.
+struct ClosureTest {
+  bool closed = false;
+  std::size_t rays = 0;
+};
+ClosureTest test_closure(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+                         const std::vector<char>& usable, std::uint64_t seed);
+/// The same of the elements from `begin` to before `end` only.
+ClosureTest test_closure(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+                         const std::vector<char>& usable, std::uint64_t seed, std::size_t begin,
+                         std::size_t end);
+
+}  // namespace truebox
