@@ -40,7 +40,7 @@ const std::map<std::string, Modules>& allowed_modules() {
       {"reference/provenance", {"radiometry", "image"}},
       {"reference/analytic", {"radiometry", "image", "provenance"}},
       {"reference/readings", {"radiometry", "image", "provenance", "analytic"}},
-      {"calibration/photometry", kLeft},
+      {"calibration/photometry", join(kLeft, {"uncertainty"})},
       {"calibration/uncertainty", kLeft},
       {"calibration/alignment", join(kLeft, {"photometry", "uncertainty"})},
       {"calibration/fit", join(kLeft, {"photometry", "uncertainty", "alignment"})},
@@ -83,6 +83,7 @@ const std::vector<ThirdParty>& third_parties() {
       {"Eigen/", {"solver/", "calibration/"}, true},
       {"CLI/", {}},
       {"opencv2/imgproc", {"reports/difference"}},  // image filters; a package of its own
+      {"opencv2/photo", {"calibration/photometry"}},  // response curves; a package of its own
       {"opencv2/", {"calibration/alignment"}},
       {"boost/math/", {"calibration/uncertainty"}},
       {"gtest/", {}},
