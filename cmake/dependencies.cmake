@@ -23,6 +23,23 @@ if(NOT TARGET opencv_imgproc)
   target_link_libraries(opencv_imgproc INTERFACE
     ${TRUEBOX_OPENCV_IMGPROC} ${TRUEBOX_OPENCV_CORE})
 endif()
+# The same for response curves from exposure series (photo).
+find_path(TRUEBOX_OPENCV_PHOTO_INCLUDE opencv2/photo.hpp PATH_SUFFIXES opencv4 REQUIRED)
+find_library(TRUEBOX_OPENCV_PHOTO opencv_photo REQUIRED)
+if(NOT TARGET opencv_photo)
+  add_library(opencv_photo INTERFACE IMPORTED)
+  target_include_directories(opencv_photo SYSTEM INTERFACE ${TRUEBOX_OPENCV_PHOTO_INCLUDE})
+  target_link_libraries(opencv_photo INTERFACE
+    ${TRUEBOX_OPENCV_PHOTO} ${TRUEBOX_OPENCV_IMGPROC} ${TRUEBOX_OPENCV_CORE})
+endif()
+# And for finding a ColorChecker (mcc); its header includes that of dnn.
+find_path(TRUEBOX_OPENCV_MCC_INCLUDE opencv2/mcc.hpp PATH_SUFFIXES opencv4 REQUIRED)
+find_library(TRUEBOX_OPENCV_MCC opencv_mcc REQUIRED)
+if(NOT TARGET opencv_mcc)
+  add_library(opencv_mcc INTERFACE IMPORTED)
+  target_include_directories(opencv_mcc SYSTEM INTERFACE ${TRUEBOX_OPENCV_MCC_INCLUDE})
+  target_link_libraries(opencv_mcc INTERFACE ${TRUEBOX_OPENCV_MCC} ${TRUEBOX_OPENCV_CORE})
+endif()
 # Debian puts this config into /usr/share/cmake itself, where find_package does not look.
 find_package(OpenColorIO CONFIG REQUIRED PATHS /usr/share/cmake NO_DEFAULT_PATH)
 # Debian's OpenColorIO 2.1.2 config was moved without its prefix and names the folder "/include",

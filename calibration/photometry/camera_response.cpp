@@ -69,19 +69,43 @@ Normal assemble(const std::vector<ExposureSeries>& series, double offset, double
   return normal;
 }
 
+/// The reading, as a fraction, at which a rising table holds `signal`; clamped to its ends.
+double table_position(const std::vector<Estimate>& table, double signal) {
+  const auto above = std::upper_bound(table.begin(), table.end(), signal,
+                                      [](double s, const Estimate& e) { return s < e.value; });
+  if (above == table.begin()) return 0.0;
+  if (above == table.end()) return static_cast<double>(table.size() - 1);
+  const double low = (above - 1)->value, high = above->value;
+  return static_cast<double>(above - table.begin()) - 1.0 + (signal - low) / (high - low);
+}
+
 }  // namespace
 
 double CameraResponse::linear_dn(double reading_dn) const {
+  if (!table_dn.empty()) {
+    const double last = static_cast<double>(table_dn.size() - 1);
+    const double r = std::clamp(reading_dn, 0.0, last);
+    const auto k = static_cast<std::size_t>(std::min(r, last - 1.0));
+    const double share = r - static_cast<double>(k);
+    return (1.0 - share) * table_dn[k].value + share * table_dn[k + 1].value;
+  }
   const double v = reading_dn - offset_dn.value, k = curvature_per_dn.value;
   if (std::abs(k * v) < 1e-12) return v;
   return (1.0 - std::sqrt(std::max(1.0 - 4.0 * k * v, 0.0))) / (2.0 * k);
 }
 
 double CameraResponse::slope(double signal_dn) const {
+  if (!table_dn.empty()) {
+    const double last = static_cast<double>(table_dn.size() - 1);
+    const double r = table_position(table_dn, signal_dn);
+    const double a = std::max(r - 1.0, 0.0), b = std::min(r + 1.0, last);
+    return (b - a) / (linear_dn(b) - linear_dn(a));
+  }
   return std::max(1.0 - 2.0 * curvature_per_dn.value * signal_dn, 1e-3);
 }
 
 double CameraResponse::reading_dn(double signal_dn) const {
+  if (!table_dn.empty()) return table_position(table_dn, signal_dn);
   return offset_dn.value + signal_dn - curvature_per_dn.value * signal_dn * signal_dn;
 }
 

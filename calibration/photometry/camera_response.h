@@ -11,9 +11,12 @@ namespace truebox {
 ///   reading = offset + x - curvature x^2
 /// The offset is the black level below the digital zero, which dark frames clipped at 0 cannot
 /// show; the curvature is the onset of saturation. Only exposure series reveal both.
+/// Where a camera's files are tone-mapped a table takes their place: the signal of each whole
+/// reading 0, 1, 2, ... (`response_curve.h`).
 struct CameraResponse {
   Estimate offset_dn;
   Estimate curvature_per_dn;
+  std::vector<Estimate> table_dn{};  ///< signal at each whole reading, rising; empty: no table
 
   double linear_dn(double reading_dn) const;  ///< x of a reading; monotone, 0 at offset
   double slope(double signal_dn) const;       ///< d reading / d x

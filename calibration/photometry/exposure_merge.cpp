@@ -17,10 +17,12 @@ constexpr double kClippedVariance_dn2 = 1.0 / 3.0;
 struct Reading {
   double exposure_s, raw_dn, signal_dn, dark_variance_dn2;
   bool in_range;
+  const MasterDark* dark;
 };
 
 struct Rate {
   double value = 0.0, variance = std::numeric_limits<double>::infinity();
+  double effective_s = 0.0;
   std::size_t used = 0;
 };
 
@@ -32,7 +34,12 @@ double variance_dn2(const Reading& reading, double expected_dn, const MergeOptio
 Rate weighted_rate(const std::vector<Reading>& readings, const std::vector<char>& use, double guess,
                    const MergeOptions& options) {
   Rate rate;
-  double top = 0.0, bottom = 0.0;
+  double top = 0.0, bottom = 0.0, over_t = 0.0, shared = 0.0, run = 0.0, run_squares = 0.0;
+  const MasterDark* dark = nullptr;
+  const auto close_run = [&] {  // frames of one exposure and its dark stand side by side
+    shared += run * run - run_squares;
+    run = run_squares = 0.0;
+  };
   for (std::size_t i = 0; i < readings.size(); ++i) {
     if (!use[i]) continue;
     const double t = readings[i].exposure_s;
@@ -40,9 +47,18 @@ Rate weighted_rate(const std::vector<Reading>& readings, const std::vector<char>
     const double v = variance_dn2(readings[i], expected, options);
     top += t * readings[i].signal_dn / v;
     bottom += t * t / v;
+    over_t += t / v;
     ++rate.used;
+    if (readings[i].dark != dark) close_run();
+    dark = readings[i].dark;
+    const double slope = options.response.slope(expected);
+    const double lever = t / v * std::sqrt(readings[i].dark_variance_dn2) / slope;
+    run += lever;
+    run_squares += lever * lever;
   }
-  if (rate.used > 0) rate = {top / bottom, 1.0 / bottom, rate.used};
+  close_run();
+  if (rate.used > 0)
+    rate = {top / bottom, (1.0 + shared / bottom) / bottom, bottom / over_t, rate.used};
   return rate;
 }
 
@@ -67,9 +83,10 @@ Rate bound(const std::vector<Reading>& readings, const MergeOptions& options) {
   const double t = longest.exposure_s;
   if (longest.raw_dn < options.saturation_dn)  // below the floor everywhere
     return {longest.signal_dn / t,
-            (variance_dn2(longest, longest.signal_dn, options) + kClippedVariance_dn2) / (t * t),
+            (variance_dn2(longest, longest.signal_dn, options) + kClippedVariance_dn2) / (t * t), t,
             0};
-  return {shortest.signal_dn / shortest.exposure_s, std::numeric_limits<double>::infinity(), 0};
+  return {shortest.signal_dn / shortest.exposure_s, std::numeric_limits<double>::infinity(),
+          shortest.exposure_s, 0};
 }
 
 Rate merge_photosite(const std::vector<Reading>& readings, const MergeOptions& options,
@@ -121,6 +138,12 @@ MergeResult merge_exposures(const std::vector<Frame>& frames, const std::vector<
     result.exposures_s.push_back(sorted[i]->exposure_s);
   }
 
+  std::map<char, MergeOptions> of_site;
+  for (const auto& [site, noise] : options.noise_of_site) {
+    of_site[site] = options;
+    of_site[site].noise = noise;
+  }
+  result.effective_s.resize(pixels);
   std::vector<Reading> readings(count);
   std::vector<char> use(count);
   std::vector<double> ratio(count, 0.0), weight(count, 0.0);
@@ -129,11 +152,19 @@ MergeResult merge_exposures(const std::vector<Frame>& frames, const std::vector<
     for (std::size_t i = 0; i < count; ++i) {
       const double raw = sorted[i]->image.channels[0].samples[p];
       const double level = dark[i] ? double{dark[i]->mean_dn[p]} : 0.0;
-      readings[i] = {sorted[i]->exposure_s, raw, options.response.linear_dn(raw - level),
-                     dark[i] ? dark[i]->variance_dn2 : 0.0,
-                     raw < options.saturation_dn && raw >= options.floor_dn};
+      readings[i] = {sorted[i]->exposure_s,
+                     raw,
+                     options.response.linear_dn(raw - level),
+                     dark[i] ? dark[i]->variance_at(p) : 0.0,
+                     raw < options.saturation_dn && raw >= options.floor_dn,
+                     dark[i]};
     }
-    const Rate rate = merge_photosite(readings, options, use);
+    const int x = static_cast<int>(p % static_cast<std::size_t>(photograph.width));
+    const int y = static_cast<int>(p / static_cast<std::size_t>(photograph.width));
+    const auto own = of_site.find(bayer.site(x, y));
+    const MergeOptions& site_options = own == of_site.end() ? options : own->second;
+    const Rate rate = merge_photosite(readings, site_options, use);
+    result.effective_s[p] = static_cast<float>(rate.effective_s);
     photograph.value[p] = static_cast<float>(rate.value);
     photograph.variance[p] = static_cast<float>(rate.variance);
     photograph.exposures_used[p] = static_cast<std::uint8_t>(rate.used);
@@ -141,7 +172,7 @@ MergeResult merge_exposures(const std::vector<Frame>& frames, const std::vector<
     for (std::size_t i = 0; i < count; ++i) {
       if (!use[i]) continue;
       const double expected = rate.value * readings[i].exposure_s;
-      const double v = variance_dn2(readings[i], expected, options);
+      const double v = variance_dn2(readings[i], expected, site_options);
       chi2 += std::pow(readings[i].signal_dn - expected, 2) / v;
       ratio[i] += expected * readings[i].signal_dn / v;
       weight[i] += expected * expected / v;

@@ -9,6 +9,11 @@
 #include "radiometry/input_error.h"
 
 namespace truebox {
+namespace {
+
+constexpr double kPriorFrames = 4.0;
+
+}  // namespace
 
 MasterDark mean_dark(const std::vector<Frame>& frames) {
   if (frames.empty()) throw std::invalid_argument("a master dark needs at least one frame");
@@ -40,7 +45,17 @@ MasterDark mean_dark(const std::vector<Frame>& frames) {
   const double pixels = static_cast<double>(n);
   dark.average_dn = total / pixels;
   dark.clipped_fraction = clipped / pixels;
-  dark.variance_dn2 = std::max(pooled / pixels, kQuantisationVariance_dn2) / count;
+  const double single = std::max(pooled / pixels, kQuantisationVariance_dn2);
+  dark.variance_dn2 = single / count;
+  dark.frames = frames.size();
+  if (frames.size() < 3) return dark;
+  dark.pixel_variance_dn2.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double mean = sum[i] / count;
+    const double squares_about_mean = std::max(squares[i] - count * mean * mean, 0.0);
+    dark.pixel_variance_dn2[i] = static_cast<float>((kPriorFrames * single + squares_about_mean) /
+                                                    (kPriorFrames + count - 1.0) / count);
+  }
   return dark;
 }
 
@@ -48,6 +63,40 @@ const MasterDark* matching_dark(const std::vector<MasterDark>& darks, double exp
   for (const MasterDark& dark : darks)
     if (std::abs(dark.exposure_s - exposure_s) <= 0.01 * exposure_s) return &dark;
   return nullptr;
+}
+
+MasterDark interpolated_dark(const std::vector<MasterDark>& darks, double exposure_s) {
+  const MasterDark *below = nullptr, *above = nullptr;
+  for (const MasterDark& dark : darks) {
+    if (dark.exposure_s <= exposure_s && (!below || dark.exposure_s > below->exposure_s))
+      below = &dark;
+    if (dark.exposure_s >= exposure_s && (!above || dark.exposure_s < above->exposure_s))
+      above = &dark;
+  }
+  if (!below || !above)
+    throw MismatchError("no dark frames at " + std::to_string(exposure_s) +
+                        " s, nor on both sides of it to interpolate between");
+  if (below->mean_dn.size() != above->mean_dn.size())
+    throw MismatchError("dark frames of two sizes");
+  if (below == above) return *below;
+  const double share = (exposure_s - below->exposure_s) / (above->exposure_s - below->exposure_s);
+  const auto mix = [&](double a, double b) { return (1.0 - share) * a + share * b; };
+  const auto mix_variance = [&](double a, double b) {
+    return (1.0 - share) * (1.0 - share) * a + share * share * b;
+  };
+  MasterDark dark = *below;
+  dark.exposure_s = exposure_s;
+  dark.variance_dn2 = mix_variance(below->variance_dn2, above->variance_dn2);
+  dark.average_dn = mix(below->average_dn, above->average_dn);
+  dark.clipped_fraction = std::max(below->clipped_fraction, above->clipped_fraction);
+  dark.frames = std::min(below->frames, above->frames);
+  dark.pixel_variance_dn2.resize(dark.mean_dn.size());
+  for (std::size_t i = 0; i < dark.mean_dn.size(); ++i) {
+    dark.mean_dn[i] = static_cast<float>(mix(below->mean_dn[i], above->mean_dn[i]));
+    dark.pixel_variance_dn2[i] =
+        static_cast<float>(mix_variance(below->variance_at(i), above->variance_at(i)));
+  }
+  return dark;
 }
 
 }  // namespace truebox

@@ -14,6 +14,22 @@ Frame read_frame(const std::filesystem::path& path, double exposure_s) {
   return frame;
 }
 
+std::vector<Frame> read_frame_channels(const std::filesystem::path& path, double exposure_s) {
+  Image image = read_image(path);
+  std::vector<Frame> frames;
+  for (Channel& channel : image.channels) {
+    if (channel.name == "A") continue;
+    Frame frame{.path = path.string(), .exposure_s = exposure_s, .image = {}};
+    frame.image.width = image.width;
+    frame.image.height = image.height;
+    frame.image.attributes = image.attributes;
+    frame.image.channels.push_back(std::move(channel));
+    frames.push_back(std::move(frame));
+  }
+  if (frames.empty()) throw InputError(path.string(), 0, "a photograph", "an alpha channel alone");
+  return frames;
+}
+
 Image to_image(const Photograph& photograph) {
   Image image(photograph.width, photograph.height);
   image.add_channel("value").samples = photograph.value;

@@ -40,6 +40,10 @@ struct Photograph {
 /// Reads one frame. InputError: unreadable, truncated, or more than one channel.
 Frame read_frame(const std::filesystem::path& path, double exposure_s);
 
+/// Reads one exposure of a camera that writes several channels: one frame a channel (R, G, B or
+/// Y), an alpha channel left out; RAW mosaics and grey files are one frame. InputError as above.
+std::vector<Frame> read_frame_channels(const std::filesystem::path& path, double exposure_s);
+
 /// The photograph as an image with channels "value", "variance", "exposures" and unit attributes.
 Image to_image(const Photograph& photograph);
 

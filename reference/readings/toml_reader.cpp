@@ -73,6 +73,8 @@ void TomlTable::fail(const std::string& key, const std::string& expected,
 
 bool TomlTable::has(const std::string& key) const { return state_->table->contains(key); }
 
+int TomlTable::line() const { return line_of(*state_->table); }
+
 bool TomlTable::is_text(const std::string& key) {
   const toml::node* node = state_->find(key);
   return node && node->is_string();

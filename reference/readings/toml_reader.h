@@ -19,6 +19,7 @@ class TomlTable {
   TomlTable(TomlTable&&) noexcept;
 
   bool has(const std::string& key) const;
+  int line() const;  ///< where the table begins
   bool is_text(const std::string& key);
   std::string text(const std::string& key);
   std::string text_or(const std::string& key, const std::string& fallback);

@@ -108,7 +108,7 @@ quantum_efficiency = { R = 0.3, G = 0.4, B = 0.2 }
 }
 
 TEST_F(Program, EveryCommandHasHelpWithAnExample) {
-  for (const char* command : {"", "demo", "plan", "solve", "probe", "render", "calibrate", "fit",
+  for (const char* command : {"", "demo", "plan", "solve", "probe", "render", "calibrate", "chart", "fit",
                               "compare", "suite", "accept", "report", "validate", "export"}) {
     const Outcome help = run(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0) << command;

@@ -23,7 +23,7 @@ const std::map<std::string, Modules>& allowed_modules() {
     return a;
   };
   static const Modules kLeft = join(kSolver, kReference);
-  static const Modules kCalibration = {"photometry", "alignment", "uncertainty", "fit",
+  static const Modules kCalibration = {"photometry", "chart_finder", "alignment", "uncertainty", "fit",
                                        "verification"};
   static const Modules kBoth = join(kLeft, kCalibration);
   static const std::map<std::string, Modules> kAllowed = {
@@ -42,7 +42,8 @@ const std::map<std::string, Modules>& allowed_modules() {
       {"reference/provenance", {"radiometry", "image"}},
       {"reference/analytic", {"radiometry", "image", "provenance"}},
       {"reference/readings", {"radiometry", "image", "provenance", "analytic"}},
-      {"calibration/photometry", kLeft},
+      {"calibration/photometry", join(kLeft, {"uncertainty"})},
+      {"calibration/chart_finder", kLeft},
       {"calibration/uncertainty", kLeft},
       {"calibration/alignment", join(kLeft, {"photometry", "uncertainty"})},
       {"calibration/fit", join(kLeft, {"photometry", "uncertainty", "alignment"})},
@@ -87,6 +88,8 @@ const std::vector<ThirdParty>& third_parties() {
       {"Eigen/", {"solver/", "calibration/"}, true},
       {"CLI/", {}},
       {"opencv2/imgproc", {"reports/difference"}},  // image filters; a package of its own
+      {"opencv2/photo", {"calibration/photometry"}},  // response curves; a package of its own
+      {"opencv2/mcc", {"calibration/chart_finder"}},  // finds colour charts
       {"opencv2/", {"calibration/alignment"}},
       {"boost/math/", {"calibration/uncertainty"}},
       {"gtest/", {}},
