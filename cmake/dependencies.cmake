@@ -3,6 +3,7 @@
 find_package(Threads REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(PNG REQUIRED)
+find_package(JPEG REQUIRED)
 find_package(TIFF REQUIRED)
 find_package(OpenEXR CONFIG REQUIRED)
 find_package(Eigen3 CONFIG REQUIRED)
@@ -22,6 +23,12 @@ if(NOT TARGET opencv_imgproc)
   target_include_directories(opencv_imgproc SYSTEM INTERFACE ${TRUEBOX_OPENCV_INCLUDE})
   target_link_libraries(opencv_imgproc INTERFACE
     ${TRUEBOX_OPENCV_IMGPROC} ${TRUEBOX_OPENCV_CORE})
+endif()
+# Chessboard corners, likewise; it needs the filters for their sub-pixel positions.
+find_library(TRUEBOX_OPENCV_CALIB3D opencv_calib3d REQUIRED)
+if(NOT TARGET opencv_calib3d)
+  add_library(opencv_calib3d INTERFACE IMPORTED)
+  target_link_libraries(opencv_calib3d INTERFACE ${TRUEBOX_OPENCV_CALIB3D} opencv_imgproc)
 endif()
 # Debian puts this config into /usr/share/cmake itself, where find_package does not look.
 find_package(OpenColorIO CONFIG REQUIRED PATHS /usr/share/cmake NO_DEFAULT_PATH)

@@ -69,9 +69,10 @@ const std::vector<ThirdParty>& third_parties() {
       {"Iex", {"solver/image"}},
       {"half.h", {"solver/image"}},  // Imath's
       {"png.h", {"solver/image"}},
+      {"jpeglib.h", {"solver/image"}},
       {"tiff", {"solver/image"}},
       {"toml++/", {"solver/scene", "reference/readings"}},
-      {"ceres/", {"calibration/fit"}},
+      {"ceres/", {"calibration/fit", "calibration/alignment"}},
       {"OpenColorIO/", {"reports/colour"}},
       {"mustache", {"reports/document"}},
       {"kainjow/", {"reports/document"}},
@@ -82,8 +83,10 @@ const std::vector<ThirdParty>& third_parties() {
       {"unsupported/Eigen/", {"solver/transport"}},
       {"Eigen/", {"solver/", "calibration/"}, true},
       {"CLI/", {}},
-      {"opencv2/imgproc", {"reports/difference"}},  // image filters; a package of its own
-      {"opencv2/", {"calibration/alignment"}},
+      // OpenCV's libraries, each a package: calibration may not borrow the reports' filters, but a
+      // chessboard's corners are found by one library and made sub-pixel by the other.
+      {"opencv2/imgproc", {"reports/difference", "calibration/alignment"}},
+      {"opencv2/calib3d", {"calibration/alignment"}},
       {"boost/math/", {"calibration/uncertainty"}},
       {"gtest/", {}},
       {"gmock/", {}}};
