@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "align_chessboard.h"
 #include "align_files.h"
 #include "commands.h"
 #include "document/writers.h"
@@ -19,6 +20,8 @@ namespace truebox::app {
 namespace {
 
 struct AlignArguments {
+  std::vector<std::string> files;  // SCENE PHOTO, or photographs of a chessboard
+  ChessboardArguments chessboard;
   std::string scene, photograph, camera, points, directory = "aligned";
   std::string lens = "radial";
   AlignmentOptions options;
@@ -89,6 +92,16 @@ void print_found(const BoxAlignment& found) {
 }
 
 int align(AlignArguments a) {
+  if (!a.chessboard.corners.empty()) {
+    a.chessboard.photographs = a.files;
+    a.chessboard.directory = a.directory;
+    return calibrate_from_chessboard(a.chessboard);
+  }
+  if (a.files.size() != 2)
+    throw InputError("align", 0, "a scene file and a photograph",
+                     std::to_string(a.files.size()) + " files");
+  a.scene = a.files[0];
+  a.photograph = a.files[1];
   const Scene scene = read_scene(a.scene);
   const CameraDescription guess = camera_of(scene, a.camera);
   if (!a.points.empty()) a.options.points = read_picked_points(a.points, scene.metres_per_unit);
@@ -122,9 +135,16 @@ void add_align_command(CLI::App& program, Action& chosen) {
   auto* command = program.add_subcommand(
       "align", "camera pose and lens from the edges of a known box, with their uncertainties");
   auto a = std::make_shared<AlignArguments>();
-  command->add_option("SCENE", a->scene, "scene file (TOML) with the box and a camera as the guess")
+  command
+      ->add_option("FILES", a->files,
+                   "SCENE PHOTO: a scene file with the box and a camera as the guess, and a "
+                   "photograph of that box; or IMAGES of a --chessboard")
       ->required();
-  command->add_option("PHOTO", a->photograph, "photograph of that box")->required();
+  auto* chessboard =
+      command->add_option("--chessboard", a->chessboard.corners,
+                          "inner corners of a board, 9x6: lens from photographs of it");
+  command->add_option("--square", a->chessboard.square, "length of its squares, 25mm")
+      ->needs(chessboard);
   command->add_option("--camera", a->camera, "the guess, a camera of the scene file");
   command->add_option("-o,--output", a->directory, "directory to write into")
       ->capture_default_str();
@@ -163,6 +183,8 @@ void add_align_command(CLI::App& program, Action& chosen) {
       "Example:\n"
       "  truebox render reference/cornell_box/cornell_box.toml --camera front -o box.exr\n"
       "  truebox align reference/cornell_box/cornell_box.toml box.exr --camera front -o aligned\n"
+      "  truebox align --chessboard 9x6 --square 25mm reference/chessboard_opencv/left*.jpg -o "
+      "lens\n"
       "writes alignment.json, camera.toml, overlay.png, report.html; exit code 5 if the "
       "photograph\n"
       "shows no such box or does not determine the camera");

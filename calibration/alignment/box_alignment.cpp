@@ -147,10 +147,8 @@ CameraParameters BoxAligner::coarse(const std::vector<EdgeSample>& from_guess) c
   const ParameterFreedom pose = coarse_freedom(full_);
   const EdgeField first = field(160), second = field(320);
   std::vector<CameraParameters> candidates = {guess_};
-  if (options_.search && options_.points.size() < 4) {
-    const auto found = pose_candidates(guess_, from_guess, first, {}, 24);
-    candidates.insert(candidates.end(), found.begin(), found.end());
-  }
+  const auto found = pose_candidates(guess_, from_guess, first, {}, 24);
+  candidates.insert(candidates.end(), found.begin(), found.end());
   const auto score = [&](const CameraParameters& p, const EdgeField& at) {
     const auto seen = samples(p, {.spacing_px = 4.0 * at.scale(), .probe_px = at.scale()});
     return seen.size() < 8 ? 1.0 : edge_distance_score(p, seen, at, 3.0 * at.scale());
@@ -185,7 +183,11 @@ BoxAlignment BoxAligner::run() {
     result.message = "the camera of the guess sees no edges of the scene, not even near the film";
     return result;
   }
-  CameraParameters p = coarse(from_guess);
+  const bool searched = options_.search && options_.points.size() < 4;
+  CameraParameters p = searched ? coarse(from_guess) : guess_;
+  // A guess with picked points is first brought to them.
+  if (!searched && options_.points.size() >= 4)
+    p = refine(p, {{}, options_.points}, {coarse_freedom(full_), 3.0, 50}).parameters;
   tell("refinement", 0.6);
   for (const int size : {640, 1280})
     if (std::max(planes_.width, planes_.height) > size / 2)

@@ -165,7 +165,7 @@ std::vector<EdgeSample> SceneEdges::visible(const Camera& camera,
                                             const EdgeSampling& sampling) const {
   std::vector<EdgeSample> samples;
   for (std::size_t e = 0; e < edges_.size(); ++e) sample(e, camera, sampling, samples);
-  return cleared(samples, sampling.clearance_px);
+  return sampling.clearance_px > 0.0 ? cleared(samples, sampling.clearance_px) : samples;
 }
 
 }  // namespace truebox

@@ -27,8 +27,8 @@ inline Scene test_box() {
   add("right", {{-1, 0, 0}, {-1, 2, 0}, {-1, 2, 2}, {-1, 0, 2}});
   add("left", {{1, 0, 0}, {1, 0, 2}, {1, 2, 2}, {1, 2, 0}});
   const double c = 0.35 * std::cos(0.5), s = 0.35 * std::sin(0.5);
-  const Vec3 corner[] = {{0.3 + c, 0, 1.1 + s}, {0.3 - s, 0, 1.1 + c}, {0.3 - c, 0, 1.1 - s},
-                         {0.3 + s, 0, 1.1 - c}};
+  const Vec3 corner[] = {
+      {0.3 + c, 0, 1.1 + s}, {0.3 - s, 0, 1.1 + c}, {0.3 - c, 0, 1.1 - s}, {0.3 + s, 0, 1.1 - c}};
   const Vec3 up(0, 0.6, 0);
   add("cube top", {corner[3] + up, corner[2] + up, corner[1] + up, corner[0] + up});
   for (int k = 0; k < 4; ++k) {
@@ -62,8 +62,7 @@ inline double even_shade(int surface, const Vec3&) {
 /// corners and centre see one surface, else `samples` low-discrepancy ones (Roberts' R2 sequence,
 /// shifted by pixel). Simulated, and without any solution of light transport.
 inline Image edge_picture(const Scene& scene, const CameraDescription& description,
-                          const Shade& shade, double noise, std::uint64_t seed,
-                          int samples = 256) {
+                          const Shade& shade, double noise, std::uint64_t seed, int samples = 256) {
   const Camera camera(description);
   std::vector<TriangleGroup> groups(scene.surfaces.size());
   for (std::size_t s = 0; s < groups.size(); ++s)
