@@ -27,6 +27,7 @@ using Action = std::function<int()>;
 
 // Each adds one subcommand and sets `chosen` when the user picked it. One file a subcommand.
 void add_accept_command(CLI::App& program, Action& chosen);
+void add_align_command(CLI::App& program, Action& chosen);
 void add_calibrate_command(CLI::App& program, Action& chosen);
 void add_chart_command(CLI::App& program, Action& chosen);
 void add_compare_command(CLI::App& program, Action& chosen);

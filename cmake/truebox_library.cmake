@@ -15,6 +15,7 @@ function(truebox_library module)
     PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:truebox_warnings>)
   install(TARGETS truebox_${module} EXPORT trueboxTargets ARCHIVE DESTINATION lib)
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION include/truebox/${module}
-    FILES_MATCHING PATTERN "*.h" PATTERN "codecs.h" EXCLUDE PATTERN "box_scene.h" EXCLUDE)
+    FILES_MATCHING PATTERN "*.h" PATTERN "codecs.h" EXCLUDE
+    PATTERN "exif_orientation.h" EXCLUDE PATTERN "box_scene.h" EXCLUDE)
   set_property(GLOBAL APPEND PROPERTY TRUEBOX_MODULES truebox::${module})
 endfunction()

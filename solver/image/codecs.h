@@ -13,6 +13,7 @@ namespace truebox::codecs {
 
 Image read_exr(const std::filesystem::path& path);
 Image read_hdr(const std::filesystem::path& path);
+Image read_jpeg(const std::filesystem::path& path);
 Image read_png(const std::filesystem::path& path);
 Image read_tiff(const std::filesystem::path& path);
 

@@ -31,9 +31,10 @@ Image read_image(const std::filesystem::path& path) {
   if (starts_with({0x89, 'P', 'N', 'G'})) return codecs::read_png(path);
   if (starts_with({'I', 'I', 42, 0}) || starts_with({'M', 'M', 0, 42}))
     return codecs::read_tiff(path);
+  if (starts_with({0xff, 0xd8, 0xff})) return codecs::read_jpeg(path);
   if (starts_with({'#', '?', 'R', 'A'}) || starts_with({'#', '?', 'R', 'G'}))
     return codecs::read_hdr(path);
-  throw InputError(path.string(), 0, "an OpenEXR, PNG, TIFF or Radiance image",
+  throw InputError(path.string(), 0, "an OpenEXR, PNG, TIFF, JPEG or Radiance image",
                    "another kind of file");
 }
 

@@ -10,8 +10,8 @@
 
 namespace truebox {
 
-/// Reads EXR (half, float or integer), PNG (8 or 16 bit), TIFF (8 or 16 bit, float) or Radiance
-/// pictures (EXPOSURE divided out), by content. Integer samples keep their digital numbers (DN),
+/// Reads EXR (half, float or integer), PNG (8 or 16 bit), TIFF (8 or 16 bit, float), JPEG (grey or
+/// RGB, upright as its Exif says) or Radiance pictures (EXPOSURE divided out), by content. Integer samples keep their digital numbers (DN),
 /// nothing is linearised or scaled, NaN and Inf stay; palette PNGs keep their indices.
 /// Of an EXR with several parts, the first part's channels keep their names, others are called
 /// "<part>.<channel>". InputError: missing, truncated, of another kind; EXR parts that are deep

@@ -23,8 +23,8 @@ const std::map<std::string, Modules>& allowed_modules() {
     return a;
   };
   static const Modules kLeft = join(kSolver, kReference);
-  static const Modules kCalibration = {"photometry", "chart_finder", "alignment", "uncertainty", "fit",
-                                       "verification"};
+  static const Modules kCalibration = {"photometry",  "chart_finder", "alignment",
+                                       "uncertainty", "fit",          "verification"};
   static const Modules kBoth = join(kLeft, kCalibration);
   static const std::map<std::string, Modules> kAllowed = {
       {"solver/radiometry", {}},
@@ -74,9 +74,10 @@ const std::vector<ThirdParty>& third_parties() {
       {"Iex", {"solver/image"}},
       {"half.h", {"solver/image"}},  // Imath's
       {"png.h", {"solver/image"}},
+      {"jpeglib.h", {"solver/image"}},
       {"tiff", {"solver/image"}},
       {"toml++/", {"solver/scene", "reference/readings"}},
-      {"ceres/", {"calibration/fit"}},
+      {"ceres/", {"calibration/fit", "calibration/alignment"}},
       {"OpenColorIO/", {"reports/colour"}},
       {"mustache", {"reports/document"}},
       {"kainjow/", {"reports/document"}},
@@ -87,10 +88,12 @@ const std::vector<ThirdParty>& third_parties() {
       {"unsupported/Eigen/", {"solver/transport"}},
       {"Eigen/", {"solver/", "calibration/"}, true},
       {"CLI/", {}},
-      {"opencv2/imgproc", {"reports/difference"}},  // image filters; a package of its own
       {"opencv2/photo", {"calibration/photometry"}},  // response curves; a package of its own
       {"opencv2/mcc", {"calibration/chart_finder"}},  // finds colour charts
-      {"opencv2/", {"calibration/alignment"}},
+      // OpenCV's libraries, each a package: calibration may not borrow the reports' filters, but a
+      // chessboard's corners are found by one library and made sub-pixel by the other.
+      {"opencv2/imgproc", {"reports/difference", "calibration/alignment"}},
+      {"opencv2/calib3d", {"calibration/alignment"}},
       {"boost/math/", {"calibration/uncertainty"}},
       {"gtest/", {}},
       {"gmock/", {}}};
