@@ -9,7 +9,9 @@
 
 #include "commands.h"
 #include "fit/chart_measurement.h"
+#include "fit_scene.h"
 #include "image/image_file.h"
+#include "readings/scene_measurement.h"
 
 namespace truebox::app {
 namespace {
@@ -17,7 +19,9 @@ namespace {
 struct FitArguments {
   std::string measurement;
   std::string output;
+  std::string directory;
   bool all_patches = false;
+  bool select = false;
 };
 
 nlohmann::json estimate_json(const Estimate& e) {
@@ -114,6 +118,14 @@ void print_table(const ChartMeasurement& measurement, bool all_patches) {
 }
 
 int fit(const FitArguments& arguments) {
+  if (is_scene_measurement(arguments.measurement))
+    return fit_scene_measurement(
+        {arguments.measurement, arguments.output, arguments.directory, arguments.select});
+  if (arguments.select || !arguments.directory.empty()) {
+    fmt::print(stderr, "truebox: {} belongs to measurements of a scene\n",
+               arguments.select ? "--select" : "--report");
+    return kUsage;
+  }
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const ChartMeasurement measurement =
       measure_chart(read_measurement(arguments.measurement), [&](const std::string& stage, double) {
@@ -143,9 +155,15 @@ void add_fit_command(CLI::App& program, Action& chosen) {
   command->add_option("MEASUREMENT", arguments->measurement, "measurement file (TOML)")->required();
   command->add_option("-o,--output", arguments->output, "JSON file with every number");
   command->add_flag("--all", arguments->all_patches,
-                    "print every patch, not only those that differ");
+                    "chart: print every patch, not only those that differ");
+  command->add_option("--report", arguments->directory,
+                      "scene: folder of a report (HTML, JSON) and residual maps (EXR, PNG)");
+  command->add_flag("--select", arguments->select,
+                    "scene: does the data need interreflection, or more than one band?");
   command->footer(
-      "Example:\n  truebox fit reference/llanos_narrowband/measurement.toml -o fit.json\n"
+      "Examples:\n  truebox fit reference/llanos_narrowband/measurement.toml -o fit.json\n"
+      "  truebox fit box.toml -o fit.json --report out/fit     box.toml names scene and photographs\n"
+      "Ctrl-C ends the fit of a scene with the best so far. "
       "exit code 5 if a fit did not converge or is rank deficient (the null direction is named)");
   command->callback([arguments, &chosen] { chosen = [arguments] { return fit(*arguments); }; });
 }

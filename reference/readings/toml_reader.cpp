@@ -75,6 +75,12 @@ bool TomlTable::has(const std::string& key) const { return state_->table->contai
 
 int TomlTable::line() const { return line_of(*state_->table); }
 
+std::vector<std::string> TomlTable::keys() const {
+  std::vector<std::string> names;
+  for (const auto& [key, node] : *state_->table) names.emplace_back(key.str());
+  return names;
+}
+
 bool TomlTable::is_text(const std::string& key) {
   const toml::node* node = state_->find(key);
   return node && node->is_string();

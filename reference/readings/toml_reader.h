@@ -19,7 +19,8 @@ class TomlTable {
   TomlTable(TomlTable&&) noexcept;
 
   bool has(const std::string& key) const;
-  int line() const;  ///< where the table begins
+  int line() const;                       ///< where the table begins
+  std::vector<std::string> keys() const;  ///< where names are the author's own
   bool is_text(const std::string& key);
   std::string text(const std::string& key);
   std::string text_or(const std::string& key, const std::string& fallback);

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// From image files to readings. Internal to this folder's sources.
+#pragma once
+
+#include "fit/scene_measurement_fit.h"
+
+namespace truebox {
+
+/// Adds the views, planes, readings and counts of every photograph of the measurement's file.
+void add_planes(SceneMeasurement& measurement, const Progress& progress);
+
+}  // namespace truebox
