@@ -38,7 +38,11 @@ struct PredictOptions {
   SolveOptions solve;
   bool error_shares = false;   ///< solve the middle grid twice, to tell what part is the rays'
   bool sensitivities = false;  ///< of the fine grid to each material's reflectance
-  SolveGrid solve_grid;        ///< instead of a full matrix in this process; empty: that
+  SolveGrid solve_grid;        ///< instead of a matrix or links in this process; may be empty
+  /// Told the finest grid's mesh and source, returns its SolveOptions::on_progress; may be empty.
+  std::function<std::function<void(double, const BandMatrix&)>(const PatchMesh& mesh,
+                                                               const BandMatrix& source)>
+      watch_finest;
   Progress progress;
 };
 
