@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <optional>
 
+#include "radiometry/input_error.h"
 #include "scene/scene_file.h"
 
 namespace truebox::app {
@@ -26,6 +27,14 @@ std::optional<double> share_of(const std::string& text) {
   if (end == text.c_str() || !(rest.empty() || rest == "%") || !(share > 0.0 && share < 1.0))
     return std::nullopt;
   return share;
+}
+
+Goal goal_of(const PredictionArguments& a, const Scene& scene) {
+  try {
+    return goal_of_name(a.adaptive == kDefaultGoal ? "everywhere" : a.adaptive, scene);
+  } catch (const std::invalid_argument& error) {
+    throw InputError("--adaptive", 0, "a goal that this scene has", error.what());
+  }
 }
 
 }  // namespace
@@ -54,6 +63,9 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       ->check([](const std::string& text) {
         return share_of(text) ? "" : "a share such as 0.5% or 0.005 expected, not " + text;
       });
+  command.add_flag(std::string("--adaptive{") + kDefaultGoal + "}", a.adaptive,
+                   "refine where the error comes from instead of everywhere; =everywhere, "
+                   "=camera:NAME or =surface:NAME says whose error");
   command.add_option("--threads", a.threads, "threads, 0 for all")->check(CLI::Range(0, 1024));
   command.add_flag("--quiet", a.quiet, "no progress");
 }
@@ -85,12 +97,21 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
   options.error_shares = a.error_shares;
   options.sensitivities = a.sensitivities;
   options.progress = terminal_progress(a.quiet);
+  Predictor solve = [&](const PredictOptions& attempt) {
+    return std::make_unique<Prediction>(predicted->scene, attempt);
+  };
+  if (!a.adaptive.empty()) {
+    const Goal goal = goal_of(a, predicted->scene);
+    solve = [&predicted, goal](const PredictOptions& attempt) {
+      return predict_adaptively(predicted->scene, attempt, goal, &predicted->adapt_steps);
+    };
+  }
   const auto start = std::chrono::steady_clock::now();
   if (a.target_error.empty()) {
-    predicted->prediction = std::make_unique<Prediction>(predicted->scene, options);
+    predicted->prediction = solve(options);
   } else {
     options.elements = std::min(options.elements, kFirstElements);
-    auto targeted = predict_to_target(predicted->scene, options, *share_of(a.target_error));
+    auto targeted = predict_to_target(options, *share_of(a.target_error), solve);
     predicted->prediction = std::move(targeted.prediction);
     predicted->target_steps = std::move(targeted.steps);
     predicted->misses_target = !targeted.is_reached;
@@ -108,19 +129,27 @@ std::string describe(const Predicted& p) {
                                  p.scene.bands.size(), p.seconds);
   for (const auto& reason : p.prediction->needs().reasons) text += "  " + reason + "\n";
   if (!p.prediction->needs().interreflection) return text;
-  text += fmt::format(
-      "  form factors: {} pairs without anything between, {} hidden, {} sampled with {} rays\n",
-      f.pairs_unoccluded, f.pairs_hidden, f.pairs_sampled, f.rays);
+  if (!p.adapt_steps.empty())
+    text +=
+        fmt::format("  adapted in {} steps from {} to {} elements, then each cut in four\n",
+                    p.adapt_steps.size(), p.adapt_steps.front().cells, p.adapt_steps.back().cells);
+  const bool is_exact = f.rays == 0 && f.pairs_sampled > 0;
+  text += fmt::format("  form factors: {} pairs without anything between, {} hidden, {} ",
+                      f.pairs_unoccluded, f.pairs_hidden, f.pairs_sampled);
+  text += is_exact ? "by the outlines of shadows\n" : fmt::format("sampled with {} rays\n", f.rays);
   if (f.buried_patches > 0)
     text +=
         fmt::format("  {} elements lie under another surface and see nothing\n", f.buried_patches);
-  text += f.closed ? fmt::format(
-                         "  closure: none of {} rays escaped; row sums off by {:.1e} mean, {:.1e} "
-                         "max; sampled factors scaled by at most {:.1e}, then off by {:.1e}\n",
-                         f.closure_rays, f.closure_error_mean, f.closure_error_max, f.repair_max,
-                         f.closure_residual_max)
-                   : fmt::format("  the scene is open (no repair); largest row sum {:.6f}\n",
-                                 f.row_sum_max);
+  text +=
+      is_exact ? fmt::format("  row sums off 1 by {:.1e} mean, {:.1e} max; no repair\n",
+                             f.closure_error_mean, f.closure_error_max)
+      : f.closed
+          ? fmt::format(
+                "  closure: none of {} rays escaped; row sums off by {:.1e} mean, {:.1e} "
+                "max; sampled factors scaled by at most {:.1e}, then off by {:.1e}\n",
+                f.closure_rays, f.closure_error_mean, f.closure_error_max, f.repair_max,
+                f.closure_residual_max)
+          : fmt::format("  the scene is open (no repair); largest row sum {:.6f}\n", f.row_sum_max);
   text += "  radiosity: " + grid.solve.brief() + "\n";
   if (const auto& shares = p.prediction->error_shares())
     text += fmt::format(

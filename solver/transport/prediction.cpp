@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "transport/grid_difference.h"
+#include "transport/noise_free_factors.h"
 #include "transport/sensitivity.h"
 
 namespace truebox {
@@ -51,10 +52,11 @@ Prediction::Prediction(const Scene& scene, const PredictOptions& options)
   distinct_scene_ = in_bands(scene, needs_.distinct_bands);
   const double edge_m = edge_for_count(scene, std::max<std::size_t>(1, options.elements / 16));
   if (needs_.interreflection)  // the finest grid decides; better told before the others are solved
-    require_memory(uniform_mesh(distinct_scene_, edge_m, kFinestSplit).size(),
-                   options.form_factors);
+    require_memory(mesh_of(edge_m, kFinestSplit, options).size(), options.form_factors);
   for (int k = 2; k >= 0; --k) levels_[k] = solve_level(edge_m, kFinestSplit - k, options);
-  if (options.error_shares && needs_.interreflection) {
+  if (options.error_shares && needs_.interreflection && options.exact_form_factors) {
+    error_shares_ = find_error_shares(*levels_[1]);  // nothing to sample again
+  } else if (options.error_shares && needs_.interreflection) {
     PredictOptions again = options;
     again.form_factors.seed += 1000;
     again.sensitivities = false;
@@ -63,12 +65,17 @@ Prediction::Prediction(const Scene& scene, const PredictOptions& options)
   visibility_ = std::make_unique<Visibility>(fine().mesh, scene);
 }
 
+PatchMesh Prediction::mesh_of(double edge_m, int split, const PredictOptions& options) const {
+  return options.mesh_of_grid ? options.mesh_of_grid(split)
+                              : uniform_mesh(distinct_scene_, edge_m, split);
+}
+
 std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int split,
                                                            const PredictOptions& options) const {
   auto level = std::make_unique<Level>();
   level->split = split;
   GridSolution& grid = level->solution;
-  grid.mesh = uniform_mesh(distinct_scene_, edge_m, split);
+  grid.mesh = mesh_of(edge_m, split, options);
   const auto bands = static_cast<Index>(distinct_scene_.bands.size());
   level->gather = std::make_unique<Gather>(grid.mesh, distinct_scene_, needs_.occlusion);
   grid.direct = mean_direct(grid.mesh, *level->gather, bands);
@@ -87,7 +94,10 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   factor_options.seed = options.form_factors.seed + static_cast<std::uint64_t>(split);
   factor_options.progress = options.progress;
   const Visibility visibility(grid.mesh, distinct_scene_);
-  const FormFactors factors = form_factors(grid.mesh, distinct_scene_, visibility, factor_options);
+  const FormFactors factors =
+      options.exact_form_factors
+          ? noise_free_form_factors(grid.mesh, distinct_scene_, factor_options)
+          : form_factors(grid.mesh, distinct_scene_, visibility, factor_options);
   grid.usable = factors.usable;
   grid.form_factors = factors.summary;
   grid.solve = solve_radiosity(factors, rho, source, options.solve, grid.reflected,

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -20,8 +21,12 @@ struct PredictOptions {
   std::size_t elements = 6000;  ///< of the fine grid, about
   FormFactorOptions form_factors;
   SolveOptions solve;
-  bool error_shares = false;   ///< solve the middle grid twice, to tell what part is the rays'
-  bool sensitivities = false;  ///< of the fine grid to each material's reflectance
+  /// Meshes of the three grids, 0 the coarsest, each finer than the one before; uniform if empty
+  /// (then `elements` counts). See adapt_mesh.
+  std::function<PatchMesh(int grid)> mesh_of_grid;
+  bool exact_form_factors = false;  ///< no rays and no noise, see noise_free_form_factors
+  bool error_shares = false;        ///< solve the middle grid twice, to tell what part is the rays'
+  bool sensitivities = false;       ///< of the fine grid to each material's reflectance
   Progress progress;
 };
 
@@ -124,6 +129,7 @@ class Prediction {
     mutable std::unique_ptr<SmoothField> smooth_field;
   };
 
+  PatchMesh mesh_of(double edge_m, int split, const PredictOptions& options) const;
   std::unique_ptr<Level> solve_level(double edge_m, int split, const PredictOptions& options) const;
   void differentiate(const FormFactors& factors, const BandMatrix& rho, const SolveOptions& options,
                      GridSolution& grid) const;

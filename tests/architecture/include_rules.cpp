@@ -16,7 +16,8 @@ using Modules = std::set<std::string>;
 // meet, only calibration and reports see both.
 const std::map<std::string, Modules>& allowed_modules() {
   static const Modules kSolver = {"radiometry", "image",       "scene",  "rays",  "mesh",
-                                  "transport",  "path_tracer", "sensor", "export"};
+                                  "transport",  "path_tracer", "sensor", "adaptive",
+                                  "export"};
   static const Modules kReference = {"provenance", "analytic", "readings"};
   static const auto join = [](Modules a, const Modules& b) {
     a.insert(b.begin(), b.end());
@@ -36,6 +37,7 @@ const std::map<std::string, Modules>& allowed_modules() {
       {"solver/mesh", {"radiometry", "image", "scene"}},
       {"solver/transport", {"radiometry", "image", "scene", "rays", "mesh"}},
       {"solver/sensor", {"radiometry", "image", "scene", "mesh", "transport"}},
+      {"solver/adaptive", {"radiometry", "image", "scene", "mesh", "transport", "sensor"}},
       {"solver/export", {"radiometry", "image", "scene", "mesh", "transport"}},
       {"reference/provenance", {"radiometry", "image"}},
       {"reference/analytic", {"radiometry", "image", "provenance"}},
