@@ -69,8 +69,7 @@ void print_fit(const SceneFitRun& run) {
   if (fit.null_directions.size() > 1)
     for (const std::string& direction : fit.null_directions)
       fmt::print("not determined: {}\n", direction);
-  if (!fit.weakest_direction.empty())
-    fmt::print("\nleast determined: {}\n", fit.weakest_direction);
+  if (!fit.weakest_direction.empty()) fmt::print("\nleast determined: {}\n", fit.weakest_direction);
   if (fit.birge > 1.0)
     fmt::print("chi2/nu is above what chance explains: uncertainties enlarged by {:.2f}\n",
                fit.birge);

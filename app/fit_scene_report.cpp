@@ -177,23 +177,21 @@ Report scene_fit_report(const SceneFitRun& run) {
   report.title = file.title;
   report.subtitle = fmt::format("Reflectances from photographs{}, with their uncertainties",
                                 file.simulated ? " (simulated)" : "");
-  report.checks.push_back({"fit: converged and determined",
-                           fit.summary.outcome == Outcome::converged ? Agreement::agrees
-                                                                     : Agreement::fails,
-                           fit.summary.outcome == Outcome::converged ? 1.0 : 0.0, 1.0, "",
-                           fit.summary.brief()});
+  report.checks.push_back(
+      {"fit: converged and determined",
+       fit.summary.outcome == Outcome::converged ? Agreement::agrees : Agreement::fails,
+       fit.summary.outcome == Outcome::converged ? 1.0 : 0.0, 1.0, "", fit.summary.brief()});
   if (!run.held_out.empty()) {
     const double share = 100.0 * share_within(run.held_out);
     report.checks.push_back({"held-out readings within U (k = 2)",
                              share >= 95.0 ? Agreement::agrees : Agreement::warning, share, 95.0,
                              "%", fmt::format("of {}", run.held_out.size())});
   }
-  report.verdict = {worst_outcome(report.checks),
-                    fmt::format("{}; chi2/nu = {:.2f}{}.", to_string(fit.summary.outcome),
-                                fit.summary.chi2_per_dof,
-                                fit.null_directions.empty()
-                                    ? ""
-                                    : "; not determined: " + fit.null_directions.front())};
+  report.verdict = {
+      worst_outcome(report.checks),
+      fmt::format(
+          "{}; chi2/nu = {:.2f}{}.", to_string(fit.summary.outcome), fit.summary.chi2_per_dof,
+          fit.null_directions.empty() ? "" : "; not determined: " + fit.null_directions.front())};
   report.key_numbers = {{"Readings", static_cast<double>(fit.summary.observations)},
                         {"Free parameters", static_cast<double>(fit.summary.parameters)},
                         {"chi2/nu", fit.summary.chi2_per_dof},
@@ -216,8 +214,8 @@ Report scene_fit_report(const SceneFitRun& run) {
                                       "Readings of one surface share part of their error."});
   for (std::size_t k = 0; k < run.measurement.problem.planes.size(); ++k)
     residuals.blocks.push_back(plane_pictures(run, map, k));
-  report.sections = {std::move(estimates), std::move(residuals),
-                     {"Convergence", {history_figure(fit)}}};
+  report.sections = {
+      std::move(estimates), std::move(residuals), {"Convergence", {history_figure(fit)}}};
   if (!run.candidates.empty())
     report.sections.push_back({"Model selection", {candidate_table(run.candidates)}});
   report.provenance = {{"Measurement", file.path},
@@ -250,10 +248,14 @@ nlohmann::json scene_fit_json(const SceneFitRun& run) {
                       {"least_determined", fit.weakest_direction},
                       {"bands_nm", scene.bands.centres_nm()}};
   for (const FittedParameter& p : fit.parameters) {
-    nlohmann::json item{{"name", p.name},         {"kind", p.kind},
-                        {"start", p.start},       {"value", p.estimate.value},
-                        {"at_bound", p.at_bound}, {"at_initial_value", p.at_initial_value},
-                        {"determined", p.determined}, {"note", p.note}};
+    nlohmann::json item{{"name", p.name},
+                        {"kind", p.kind},
+                        {"start", p.start},
+                        {"value", p.estimate.value},
+                        {"at_bound", p.at_bound},
+                        {"at_initial_value", p.at_initial_value},
+                        {"determined", p.determined},
+                        {"note", p.note}};
     if (p.determined && !p.at_bound) {
       item["u"] = p.estimate.standard_uncertainty;
       for (const Contribution& c : p.budget.contributions())

@@ -29,6 +29,14 @@ std::optional<double> share_of(const std::string& text) {
   return share;
 }
 
+Goal goal_of(const PredictionArguments& a, const Scene& scene) {
+  try {
+    return goal_of_name(a.adaptive == kDefaultGoal ? "everywhere" : a.adaptive, scene);
+  } catch (const std::invalid_argument& error) {
+    throw InputError("--adaptive", 0, "a goal that this scene has", error.what());
+  }
+}
+
 }  // namespace
 
 void add_prediction_options(CLI::App& command, PredictionArguments& a,
@@ -69,6 +77,9 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       ->check([](const std::string& text) {
         return share_of(text) ? "" : "a share such as 0.5% or 0.005 expected, not " + text;
       });
+  command.add_flag(std::string("--adaptive{") + kDefaultGoal + "}", a.adaptive,
+                   "refine where the error comes from instead of everywhere; =everywhere, "
+                   "=camera:NAME or =surface:NAME says whose error");
   command.add_option("--threads", a.threads, "threads, 0 for all")->check(CLI::Range(0, 1024));
   command.add_flag("--quiet", a.quiet, "no progress");
 }
@@ -122,12 +133,24 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
   options.solve.relative_bound = a.relative_bound;
   options.error_shares = a.error_shares;
   options.sensitivities = a.sensitivities;
+  Predictor solve = [&](const PredictOptions& attempt) {
+    return std::make_unique<Prediction>(predicted->scene, attempt);
+  };
+  if (!a.adaptive.empty()) {
+    if (a.solve_grid || options.find_exchange)
+      throw InputError("--adaptive", 0, "a matrix of form factors in one process",
+                       a.solve_grid ? "--distributed" : "--form-factors hierarchical");
+    const Goal goal = goal_of(a, predicted->scene);
+    solve = [&predicted, goal](const PredictOptions& attempt) {
+      return predict_adaptively(predicted->scene, attempt, goal, &predicted->adapt_steps);
+    };
+  }
   const auto start = std::chrono::steady_clock::now();
   if (a.target_error.empty()) {
-    predicted->prediction = std::make_unique<Prediction>(predicted->scene, options);
+    predicted->prediction = solve(options);
   } else {
     options.elements = std::min(options.elements, kFirstElements);
-    auto targeted = predict_to_target(predicted->scene, options, *share_of(a.target_error));
+    auto targeted = predict_to_target(options, *share_of(a.target_error), solve);
     predicted->prediction = std::move(targeted.prediction);
     predicted->target_steps = std::move(targeted.steps);
     predicted->misses_target = !targeted.is_reached;
@@ -145,6 +168,10 @@ std::string describe(const Predicted& p) {
                                  p.scene.bands.size(), p.seconds);
   for (const auto& reason : p.prediction->needs().reasons) text += "  " + reason + "\n";
   if (!p.prediction->needs().interreflection) return text;
+  if (!p.adapt_steps.empty())
+    text +=
+        fmt::format("  adapted in {} steps from {} to {} elements, then each cut in four\n",
+                    p.adapt_steps.size(), p.adapt_steps.front().cells, p.adapt_steps.back().cells);
   if (grid.links)
     text += fmt::format(
         "  links: {} between {} elements ({:.1f} an element), {} groups hidden, {} rays; {:.0f} "

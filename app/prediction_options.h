@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "adaptive/adaptive_solution.h"
 #include "hierarchy/hierarchical_exchange.h"
 #include "scene/scene.h"
 #include "transport/predict_to_target.h"
@@ -14,6 +15,9 @@ class App;
 }
 
 namespace truebox::app {
+
+/// What `--adaptive` alone means: everywhere, and of `render` what its camera sees.
+inline constexpr const char* kDefaultGoal = "default";
 
 /// What every command that predicts can be told.
 struct PredictionArguments {
@@ -27,8 +31,10 @@ struct PredictionArguments {
   std::size_t memory_MiB = 8192;
   double relative_bound = SolveOptions{}.relative_bound;
   std::string target_error;  ///< "0.5%" or "0.005": chooses elements and solver bound
+  std::string adaptive;      ///< empty: uniform; else the goal, or kDefaultGoal
   bool error_shares = false, sensitivities = false;  ///< as in PredictOptions
-  SolveGrid solve_grid;                              ///< as in PredictOptions
+  SolveGrid solve_grid;                              ///< as in PredictOptions, and:
+  decltype(PredictOptions::watch_finest) watch_finest;
   int threads = 0;
   bool quiet = false;
 };
@@ -43,6 +49,7 @@ struct Predicted {
   std::unique_ptr<Prediction> prediction;
   std::vector<TargetStep> target_steps;  ///< the attempts, where a target error was asked for
   bool misses_target = false;
+  std::vector<AdaptStep> adapt_steps;  ///< of the last mesh, where it was adapted
   double seconds = 0.0;
 };
 

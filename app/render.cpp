@@ -83,6 +83,8 @@ class Stopwatch {
 
 int render_radiosity(RenderArguments a) {
   if (a.prediction.method == "radiosity") a.prediction.method = "krylov";
+  if (a.prediction.adaptive == kDefaultGoal && !a.camera.empty())
+    a.prediction.adaptive = "camera:" + a.camera;
   const auto predicted = predict(a.prediction);
   if (predicted->prediction->outcome() != SolveOutcome::converged) {
     fmt::print(stderr, "truebox: the solver did not reach its bound\n");
@@ -177,6 +179,7 @@ void require_fitting_options(const RenderArguments& a) {
   const bool paths = a.prediction.method == "path";
   if (paths && !a.error_bound.empty()) refuse("--error-bound", "radiosity; path has --variance");
   if (paths && a.gather_above_percent >= 0.0) refuse("--gather-above", "radiosity");
+  if (paths && !a.prediction.adaptive.empty()) refuse("--adaptive", "radiosity");
   if (!paths && !a.variance.empty()) refuse("--variance", "path; radiosity has --error-bound");
   if (!paths && !a.standard_error.empty())
     refuse("--standard-error", "path; radiosity has --error-bound");

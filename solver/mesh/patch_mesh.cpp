@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 
+#include "mesh/add_piece.h"
 #include "mesh/graded_mesh.h"
 
 namespace truebox {
@@ -74,10 +74,7 @@ void grid_of_quad(const Polygon& q, const Subdivision& cut, std::vector<Polygon>
       cells.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)});
 }
 
-void grid_of_triangle(const Polygon& t, const Subdivision& cut, std::vector<Polygon>& cells) {
-  const double longest =
-      std::max({(t[1] - t[0]).norm(), (t[2] - t[1]).norm(), (t[0] - t[2]).norm()});
-  const int n = cut.cells_along(longest / std::sqrt(2.0));
+void grid_of_triangle(const Polygon& t, int n, std::vector<Polygon>& cells) {
   const auto at = [&](int i, int j) -> Vec3 {
     const double u = static_cast<double>(i) / n, v = static_cast<double>(j) / n;
     return (1 - u - v) * t[0] + u * t[1] + v * t[2];
@@ -94,69 +91,16 @@ std::vector<Polygon> cells_of(const Polygon& piece, const Subdivision& cut) {
   if (piece.size() == 4) {
     grid_of_quad(piece, cut, cells);
   } else {
+    // As many along each edge of the fan: its triangles share their vertices.
+    double longest = 0.0;
     for (std::size_t i = 2; i < piece.size(); ++i)
-      grid_of_triangle({piece[0], piece[i - 1], piece[i]}, cut, cells);
+      longest = std::max({longest, (piece[i - 1] - piece[0]).norm(),
+                          (piece[i] - piece[i - 1]).norm(), (piece[0] - piece[i]).norm()});
+    const int n = cut.cells_along(longest / std::sqrt(2.0));
+    for (std::size_t i = 2; i < piece.size(); ++i)
+      grid_of_triangle({piece[0], piece[i - 1], piece[i]}, n, cells);
   }
   return cells;
-}
-
-// Vertices of one piece, found again within a small tolerance.
-class VertexPool {
- public:
-  VertexPool(std::vector<Vec3>& vertices, const Piece& piece)
-      : vertices_(vertices), origin_(piece.polygon[0]), step_m_(1e-8 * piece.diameter_m) {}
-
-  std::uint32_t find_or_add(const Vec3& v) {
-    std::array<long long, 3> key{};
-    for (int k = 0; k < 3; ++k) key[k] = std::llround((v[k] - origin_[k]) / (4.0 * step_m_));
-    // A coordinate on a rounding border may land in the next bin: look there too.
-    for (int d = 0; d < 27; ++d) {
-      const std::array<long long, 3> near = {key[0] + d % 3 - 1, key[1] + d / 3 % 3 - 1,
-                                             key[2] + d / 9 - 1};
-      const auto found = bins_.find(near);
-      if (found != bins_.end() && (vertices_[found->second] - v).norm() < 2.0 * step_m_)
-        return found->second;
-    }
-    vertices_.push_back(v);
-    const auto index = static_cast<std::uint32_t>(vertices_.size() - 1);
-    bins_[key] = index;
-    return index;
-  }
-
- private:
-  std::vector<Vec3>& vertices_;
-  Vec3 origin_;
-  double step_m_;
-  std::map<std::array<long long, 3>, std::uint32_t> bins_;
-};
-
-void add_piece(PatchMesh& mesh, const Scene& scene, std::size_t surface, const Polygon& polygon,
-               const Subdivision& cut) {
-  Piece piece{surface,
-              polygon,
-              plane_of(polygon),
-              diameter_m(polygon),
-              static_cast<std::uint32_t>(mesh.patches.size()),
-              0,
-              contact_lines(polygon, scene)};
-  VertexPool pool(mesh.vertices, piece);
-  for (const Polygon& cell :
-       cut_along(cells_of(polygon, cut), piece.contacts, piece.plane.normal)) {
-    Patch patch;
-    patch.first_corner = static_cast<std::uint32_t>(mesh.corners.size());
-    for (const Vec3& v : cell) {
-      const std::uint32_t index = pool.find_or_add(v);
-      if (mesh.corners.size() == patch.first_corner || mesh.corners.back() != index)
-        mesh.corners.push_back(index);
-    }
-    patch.corner_count = static_cast<std::uint32_t>(mesh.corners.size()) - patch.first_corner;
-    patch.piece = static_cast<std::uint32_t>(mesh.pieces.size());
-    patch.centroid = centroid(cell);
-    patch.area_m2 = area_vector(cell).norm();
-    mesh.patches.push_back(patch);
-  }
-  piece.patch_count = static_cast<std::uint32_t>(mesh.patches.size()) - piece.first_patch;
-  mesh.pieces.push_back(std::move(piece));
 }
 
 }  // namespace
@@ -175,7 +119,11 @@ PatchMesh graded_mesh(const Scene& scene, double edge_m, double power, int level
   for (std::size_t s = 0; s < scene.surfaces.size(); ++s) {
     const Surface& surface = scene.surfaces[s];
     const Subdivision cut{surface.is_opening ? 2.0 * edge_m : edge_m, level, power, &scene};
-    for (const Polygon& polygon : surface.pieces) add_piece(mesh, scene, s, polygon, cut);
+    for (const Polygon& polygon : surface.pieces) {
+      const auto contacts = contact_lines(polygon, scene);
+      const Vec3 normal = plane_of(polygon).normal;
+      add_piece(mesh, s, polygon, contacts, cut_along(cells_of(polygon, cut), contacts, normal));
+    }
   }
   return mesh;
 }

@@ -75,6 +75,20 @@ void SmoothField::fit_corner(const PatchMesh& mesh, const std::vector<std::uint3
   }
 }
 
+// The quadratic of `corner` in the coordinates of another corner of the same piece.
+BandMatrix SmoothField::seen_from(const Corner& corner, const Corner& place) {
+  const BandMatrix& c = corner.coefficients;
+  const Vec3 d = (place.origin - corner.origin) / corner.size_m;
+  const double u = d.dot(corner.axis_u), v = d.dot(corner.axis_v);
+  const double r = place.size_m / corner.size_m;
+  BandMatrix moved(6, c.cols());
+  moved.row(0) = monomials(u, v) * c;
+  moved.row(1) = r * (c.row(1) + 2.0 * u * c.row(3) + v * c.row(4));
+  moved.row(2) = r * (c.row(2) + u * c.row(4) + 2.0 * v * c.row(5));
+  moved.bottomRows(3) = r * r * c.bottomRows(3);
+  return moved;
+}
+
 SmoothField::SmoothField(const PatchMesh& mesh, const std::vector<char>& usable,
                          const BandMatrix& means)
     : mesh_(&mesh), corner_of_(mesh.corners.size(), 0) {
@@ -99,6 +113,11 @@ SmoothField::SmoothField(const PatchMesh& mesh, const std::vector<char>& usable,
       fit_corner(mesh, neighbours, means, corner);
       corners_.push_back(std::move(corner));
     }
+  }
+  for (const PatchTopology::Constraint& c : topology.constraints(usable)) {
+    Corner& hanging = corners_[corner_of_[c.corner]];
+    hanging.coefficients = (1.0 - c.share) * seen_from(corners_[corner_of_[c.from]], hanging) +
+                           c.share * seen_from(corners_[corner_of_[c.to]], hanging);
   }
   for (const Piece& piece : mesh.pieces) {
     Bins bins;

@@ -16,8 +16,10 @@ using BandMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::
 ///   f(x) = sum_c lambda_c(x) q_c(x),
 /// q_c the quadratic that fits the means of the elements around corner c best (least squares, a
 /// plane or a constant where neighbours are few), lambda_c Wachspress coordinates in the element.
-/// Continuous inside a piece, third order in the element size where f is smooth; jumps are kept
-/// where another surface touches (contact lines) and at elements that are not `usable`.
+/// Continuous inside a piece, also where larger elements meet smaller ones (a corner that hangs in
+/// an edge takes the blend of the quadratics of its ends); third order in the element size where f
+/// is smooth; jumps are kept where another surface touches (contact lines) and at elements that are
+/// not `usable`.
 /// Sources: Wachspress (1975); partition of unity: Babuska & Melenk (1997).
 class SmoothField {
  public:
@@ -39,6 +41,7 @@ class SmoothField {
   };
   static void fit_corner(const PatchMesh& mesh, const std::vector<std::uint32_t>& neighbours,
                          const BandMatrix& means, Corner& corner);
+  static BandMatrix seen_from(const Corner& corner, const Corner& place);
 
   const PatchMesh* mesh_;
   std::vector<std::uint32_t> corner_of_;  // for each entry of mesh.corners, into corners_

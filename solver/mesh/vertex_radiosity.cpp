@@ -2,6 +2,7 @@
 #include "mesh/vertex_radiosity.h"
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -66,8 +67,9 @@ VertexRadiosity::VertexRadiosity(const PatchMesh& mesh, const std::vector<char>&
         const auto around = mesh.corners_of(mesh.patches[q]);
         for (std::size_t l = 0; l < around.size(); ++l) {
           if (around[l] != corners[k] && around[(l + 1) % around.size()] != corners[k]) continue;
-          const std::uint32_t other = topology.across(q, l);
-          is_inside &= other != PatchTopology::kNone && usable[other];
+          const auto others = topology.across(q, l);
+          is_inside &= !others.empty() && std::all_of(others.begin(), others.end(),
+                                                      [&](auto other) { return usable[other]; });
         }
       }
       places.push_back({corners[k], p, is_inside, std::move(group)});
@@ -86,7 +88,16 @@ VertexRadiosity::VertexRadiosity(const PatchMesh& mesh, const std::vector<char>&
       group = topology.reachable(usable, place.patch, place.vertex, rings);
     values_.row(row) = fitted(mesh, means, group, mesh.vertices[place.vertex]);
   }
-  if (rule == VertexRule::least_squares) return;
+  // Larger elements decide what their edges hold, or smaller neighbours would leave a crack.
+  const auto close_cracks = [&] {
+    for (const PatchTopology::Constraint& c : topology.constraints(usable))
+      values_.row(corner_of_[c.corner]) = (1.0 - c.share) * values_.row(corner_of_[c.from]) +
+                                          c.share * values_.row(corner_of_[c.to]);
+  };
+  if (rule == VertexRule::least_squares) {
+    close_cracks();
+    return;
+  }
   for (std::size_t i = 0; i < places.size(); ++i) {
     if (places[i].is_inside) continue;
     double nearest = std::numeric_limits<double>::infinity();
@@ -103,6 +114,7 @@ VertexRadiosity::VertexRadiosity(const PatchMesh& mesh, const std::vector<char>&
     values_.row(static_cast<Eigen::Index>(i)) =
         2.0 * mean_of(means, places[i].group) - values_.row(inside);
   }
+  close_cracks();
 }
 
 Eigen::VectorXd VertexRadiosity::at_corner(std::uint32_t patch, std::size_t k) const {

@@ -138,8 +138,10 @@ void Gather::add_direct(const Vec3& point, const Vec3& normal,
 
 namespace {
 
-// Four parts of a triangle or quad, a fan of triangles of anything else.
+// Two parts of a long quad, four of any other quad or triangle, a fan of triangles of anything
+// else.
 std::vector<Polygon> split(const Polygon& p) {
+  constexpr double kLong = 2.2;  // between 2 and 4, so that halves of elements 2 : 1 are squares
   std::vector<Polygon> parts;
   const std::size_t n = p.size();
   if (n == 3 || n == 4) {
@@ -148,34 +150,42 @@ std::vector<Polygon> split(const Polygon& p) {
     if (n == 3) {
       parts.push_back(middle);
       for (std::size_t i = 0; i < n; ++i) parts.push_back({middle[(i + 2) % n], p[i], middle[i]});
-    } else {
-      const Vec3 centre = 0.25 * (p[0] + p[1] + p[2] + p[3]);
-      for (std::size_t i = 0; i < n; ++i)
-        parts.push_back({middle[(i + 3) % n], p[i], middle[i], centre});
+      return parts;
     }
+    const double u = (middle[1] - middle[3]).norm(), v = (middle[2] - middle[0]).norm();
+    if (u > kLong * v)
+      return {{p[0], middle[0], middle[2], p[3]}, {middle[0], p[1], p[2], middle[2]}};
+    if (v > kLong * u)
+      return {{p[0], p[1], middle[1], middle[3]}, {middle[3], middle[1], p[2], p[3]}};
+    const Vec3 centre = 0.25 * (p[0] + p[1] + p[2] + p[3]);
+    for (std::size_t i = 0; i < n; ++i)
+      parts.push_back({middle[(i + 3) % n], p[i], middle[i], centre});
   } else {
     for (std::size_t i = 2; i < n; ++i) parts.push_back({p[0], p[i - 1], p[i]});
   }
   return parts;
 }
 
-constexpr int kDeepestSplit = 12;  // 2^-12 of an element: nearer points see rounding anyway
+constexpr int kDeepestSplit =
+    24;  // halvings, 2^-12 of an element: nearer points see rounding anyway
 
 }  // namespace
 
 void Gather::add_near_field(const Vec3& point, const Vec3& normal, const Polygon& polygon,
-                            std::uint32_t patch, int depth, const SourceAt& source_at,
+                            std::uint32_t patch, int halvings, const SourceAt& source_at,
                             Scratch& scratch, Eigen::Ref<Eigen::RowVectorXd> sum) const {
   const Vec3 centre = centroid(polygon);
-  if (diameter_m(polygon) > kNearField * (centre - point).norm() && depth < kDeepestSplit) {
-    for (const Polygon& part : split(polygon))
-      add_near_field(point, normal, part, patch, depth + 1, source_at, scratch, sum);
+  if (diameter_m(polygon) > kNearField * (centre - point).norm() && halvings < kDeepestSplit) {
+    const std::vector<Polygon> parts = split(polygon);
+    for (const Polygon& part : parts)
+      add_near_field(point, normal, part, patch, halvings + (parts.size() == 2 ? 1 : 2), source_at,
+                     scratch, sum);
     return;
   }
   const double factor = visible_factor(point, normal, polygon, mesh_.patches[patch].piece, scratch);
   if (factor <= 0.0) return;
   Eigen::VectorXd value(sum.size());
-  source_at(patch, centre, depth, value);
+  source_at(patch, centre, halvings / 2, value);
   sum += factor * value.transpose();
 }
 

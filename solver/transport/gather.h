@@ -38,7 +38,7 @@ class Gather {
                   Scratch& scratch) const;
 
   /// Radiosity (one value a band) that leaves a point of an element; `depth` says how often the
-  /// element was split to get there.
+  /// element was cut in four to get there.
   using SourceAt = std::function<void(std::uint32_t patch, const Vec3& point, int depth,
                                       Eigen::Ref<Eigen::VectorXd> value)>;
 
@@ -52,8 +52,8 @@ class Gather {
 
  private:
   void add_near_field(const Vec3& point, const Vec3& normal, const Polygon& polygon,
-                      std::uint32_t patch, int depth, const SourceAt& source_at, Scratch& scratch,
-                      Eigen::Ref<Eigen::RowVectorXd> sum) const;
+                      std::uint32_t patch, int halvings, const SourceAt& source_at,
+                      Scratch& scratch, Eigen::Ref<Eigen::RowVectorXd> sum) const;
   double factor_of_visible_parts(const Vec3& point, const Vec3& normal,
                                  std::span<const Vec3> polygon, const Plane& plane,
                                  Scratch& scratch) const;

@@ -41,6 +41,13 @@ double largest_relative_bound(const Prediction& prediction) {
 
 TargetedPrediction predict_to_target(const Scene& scene, const PredictOptions& options,
                                      double relative_error) {
+  return predict_to_target(options, relative_error, [&](const PredictOptions& attempt) {
+    return std::make_unique<Prediction>(scene, attempt);
+  });
+}
+
+TargetedPrediction predict_to_target(const PredictOptions& options, double relative_error,
+                                     const Predictor& predict) {
   if (!(relative_error > 0.0 && relative_error < 1.0))
     throw std::invalid_argument("a target error lies between 0 and 1");
   PredictOptions attempt = options;
@@ -51,7 +58,7 @@ TargetedPrediction predict_to_target(const Scene& scene, const PredictOptions& o
   TargetedPrediction result;
   while (true) {
     try {
-      result.prediction = std::make_unique<Prediction>(scene, attempt);
+      result.prediction = predict(attempt);
     } catch (const std::length_error&) {  // the mesh came out larger than foretold
       if (result.steps.empty()) throw;
       return result;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -32,5 +33,10 @@ struct TargetedPrediction {
 /// first attempt fits the memory limit.
 TargetedPrediction predict_to_target(const Scene& scene, const PredictOptions& options,
                                      double relative_error);
+
+/// The same with another way to predict with `elements` and tolerances of its options.
+using Predictor = std::function<std::unique_ptr<Prediction>(const PredictOptions&)>;
+TargetedPrediction predict_to_target(const PredictOptions& options, double relative_error,
+                                     const Predictor& predict);
 
 }  // namespace truebox

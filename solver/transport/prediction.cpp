@@ -45,10 +45,12 @@ Prediction::Prediction(const Scene& scene, const PredictOptions& options)
   const double edge_m = edge_for_count(scene, std::max<std::size_t>(1, options.elements / 16));
   // The finest grid decides; better told before the others are solved.
   if (needs_.interreflection && !options.find_exchange && !options.solve_grid)
-    require_memory(uniform_mesh(distinct_scene_, edge_m, kFinestSplit).size(),
-                   options.form_factors);
+    require_memory(mesh_of(edge_m, kFinestSplit, options).size(), options.form_factors);
   for (int k = 2; k >= 0; --k) levels_[k] = solve_level(edge_m, kFinestSplit - k, options);
-  if (options.error_shares && needs_.interreflection) {
+  if (options.error_shares && needs_.interreflection &&
+      options.form_factors.method == FormFactorMethod::exact_visibility) {
+    error_shares_ = find_error_shares(*levels_[1]);  // nothing to sample again
+  } else if (options.error_shares && needs_.interreflection) {
     PredictOptions again = options;
     again.form_factors.seed += 1000;
     again.sensitivities = false;
@@ -57,12 +59,17 @@ Prediction::Prediction(const Scene& scene, const PredictOptions& options)
   visibility_ = std::make_unique<Visibility>(fine().mesh, scene);
 }
 
+PatchMesh Prediction::mesh_of(double edge_m, int split, const PredictOptions& options) const {
+  return options.mesh_of_grid ? options.mesh_of_grid(split)
+                              : uniform_mesh(distinct_scene_, edge_m, split);
+}
+
 std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int split,
                                                            const PredictOptions& options) const {
   auto level = std::make_unique<Level>();
   level->split = split;
   GridSolution& grid = level->solution;
-  grid.mesh = uniform_mesh(distinct_scene_, edge_m, split);
+  grid.mesh = mesh_of(edge_m, split, options);
   const auto bands = static_cast<Index>(distinct_scene_.bands.size());
   level->gather = std::make_unique<Gather>(grid.mesh, distinct_scene_, needs_.occlusion);
   const ElementTree tree = element_tree(grid.mesh);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -36,6 +37,9 @@ struct PredictOptions {
   FormFactorOptions form_factors;
   FindExchange find_exchange;  ///< instead of the full matrix of form factors; may be empty
   SolveOptions solve;
+  /// Meshes of the three grids, 0 the coarsest, each finer than the one before; uniform if empty
+  /// (then `elements` counts). See adapt_mesh.
+  std::function<PatchMesh(int grid)> mesh_of_grid;
   bool error_shares = false;   ///< solve the middle grid twice, to tell what part is the rays'
   bool sensitivities = false;  ///< of the fine grid to each material's reflectance
   SolveGrid solve_grid;        ///< instead of a matrix or links in this process; may be empty
@@ -147,6 +151,7 @@ class Prediction {
     mutable std::unique_ptr<SmoothField> smooth_field;
   };
 
+  PatchMesh mesh_of(double edge_m, int split, const PredictOptions& options) const;
   std::unique_ptr<Level> solve_level(double edge_m, int split, const PredictOptions& options) const;
   void differentiate(const ExchangeOperator& exchange, const BandMatrix& rho,
                      const SolveOptions& options, GridSolution& grid) const;

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "adaptive/adaptive_solution.h"
+
+namespace truebox {
+
+std::unique_ptr<Prediction> predict_adaptively(const Scene& scene, const PredictOptions& options,
+                                               const Goal& goal, std::vector<AdaptStep>* steps) {
+  AdaptOptions adapt;
+  adapt.cells = std::max<std::size_t>(1, options.elements / 4);
+  adapt.goal = goal;
+  adapt.form_factors = options.form_factors;
+  AdaptedMesh adapted = adapt_mesh(scene, adapt);
+  if (steps) *steps = adapted.steps;
+  PredictOptions on_adapted = options;
+  on_adapted.form_factors.method = FormFactorMethod::exact_visibility;
+  on_adapted.mesh_of_grid = [&adapted](int grid) {
+    return grid == 0 ? adapted.coarse.mesh(0) : adapted.fine.mesh(grid - 1);
+  };
+  return std::make_unique<Prediction>(scene, on_adapted);
+}
+
+}  // namespace truebox
