@@ -176,7 +176,7 @@ Report alignment_report(const BoxAlignment& found, const Scene& scene, const Ima
                                        "them, {:.3g} px rms.",
                                        100.0 * found.matched_share, found.rms_px)
                          : found.message};
-  report.checks = {{"predicted edges found", agreement, found.matched_share, 0.5, "",
+  report.checks = {{"predicted edges found", agreement, found.matched_share, 0.6, "",
                     "share of the predicted pieces of edge that the photograph has there"}};
   report.key_numbers = {{"edges found", 100.0 * found.matched_share, "%"}};
   if (good) {

@@ -108,7 +108,7 @@ std::vector<EdgeMatch> BoxAligner::measure(const CameraParameters& p, const Edge
 }
 
 bool BoxAligner::refine_to_pixels(CameraParameters& p, BoxAlignment& result) {
-  constexpr int kRounds = 6;
+  constexpr int kRounds = 4;
   const EdgeField finest = field(std::max(planes_.width, planes_.height));
   const auto degrees = static_cast<double>(full_.indices().size());
   bool converged = false;

@@ -126,10 +126,12 @@ BlurredStep blurred_step(double d, double sigma, const std::array<double, 2>& no
   const double a = 0.5 * std::max(std::abs(normal[0]), std::abs(normal[1]));
   const double b = 0.5 * std::min(std::abs(normal[0]), std::abs(normal[1]));
   if (b < kLeast) {
+    if (std::abs(d) > a + 7.0 * sigma) return {d > 0.0 ? 1.0 : 0.0, 0.0, 0.0};
     const Integrals high = integrals(d + a, sigma), low = integrals(d - a, sigma);
     return {(high.once - low.once) / (2.0 * a), (high.phi - low.phi) / (2.0 * a),
             sigma * (high.density - low.density) / (2.0 * a)};
   }
+  if (std::abs(d) > a + b + 7.0 * sigma) return {d > 0.0 ? 1.0 : 0.0, 0.0, 0.0};
   // The heat equation: the derivative by sigma is sigma times the second derivative by d.
   BlurredStep step;
   for (const double i : {-1.0, 1.0})
@@ -177,8 +179,9 @@ std::optional<LocalisedEdge> localised_edge(const EdgePlanes& planes, const Edge
   edge.contrast = p[2] + p[3] * p[4];
   const double variance = eq.sum / (static_cast<double>(pixels.size()) - 6.0);
   edge.noise = std::sqrt(variance);
-  // At the least blur, sigma is no free parameter: its row must not enter the covariance.
-  const int free = p[5] > kLeastBlur ? 6 : 5;
+  // At the least blur, or where no pixel tells of it, sigma is no free parameter: its row must not
+  // enter the covariance.
+  const int free = p[5] > kLeastBlur && eq.h(5, 5) > 1e-9 * eq.h(4, 4) ? 6 : 5;
   const Eigen::MatrixXd h = eq.h.topLeftCorner(free, free);
   const Eigen::LDLT<Eigen::MatrixXd> factor(h);
   if (factor.info() != Eigen::Success || !factor.isPositive()) return std::nullopt;

@@ -4,6 +4,7 @@
 #include <ceres/ceres.h>
 #include <ceres/normal_prior.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -189,10 +190,7 @@ ParameterCovariance parameter_covariance(const CameraParameters& parameters,
     curvature += rows[i] * rows[i].transpose();
     for (std::size_t lag = 1; lag <= along_edge.size() && i + lag < rows.size(); ++lag) {
       if (observations.edges[i].edge != observations.edges[i + lag].edge) break;
-      // Newey and West's taper, which keeps the estimate positive, twice as wide as what is kept:
-      // correlations up to there are estimated, beyond they are none.
-      const double width = 2.0 * (static_cast<double>(along_edge.size()) + 1.0);
-      const double weight = along_edge[lag - 1] * (1.0 - static_cast<double>(lag) / width);
+      const double weight = along_edge[lag - 1];
       const Eigen::MatrixXd cross = rows[i] * rows[i + lag].transpose();
       scatter += weight * (cross + cross.transpose());
     }
@@ -207,6 +205,13 @@ ParameterCovariance parameter_covariance(const CameraParameters& parameters,
       scatter += j * j.transpose();
     }
   }
+  // Correlations cut off at some lag may be those of no process: what is known least is then taken
+  // as independent rather than as better than that.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scatter);
+  if (n > 0 && eigen.eigenvalues()[0] < -1e-9 * eigen.eigenvalues()[n - 1])
+    scatter = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
+                  eigen.eigenvectors().transpose() +
+              curvature;
   const NormalInverse inverse = invert_normal_matrix(curvature + prior, names);
   ParameterCovariance result;
   result.condition = inverse.condition;

@@ -71,7 +71,7 @@ std::vector<double> edge_residuals_px(const CameraParameters& parameters,
 /// solution. Errors of neighbouring observations of one edge have the correlations
 /// `along_edge[lag]` (lag 1 first); each observation's u is right: C = H^-1 (sum_ij rho_ij j_i
 /// j_j^T + P) H^-1, H = sum_i j_i j_i^T + P, j_i = rows over u_i, P the priors (a "sandwich": White
-/// 1980, Econometrica 48(4); Newey, West 1987, Econometrica 55(3)).
+/// 1980, Econometrica 48(4)).
 struct ParameterCovariance {
   AlignmentOutcome outcome = AlignmentOutcome::not_run;
   std::string null_direction;

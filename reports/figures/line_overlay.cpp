@@ -61,7 +61,8 @@ struct Canvas {
   }
 };
 
-Canvas backdrop(const Image& photograph, int n) {
+// n x n pixels of the photograph are one, or one is m x m.
+Canvas backdrop(const Image& photograph, int n, int m) {
   const auto planes = planes_of(photograph);
   const auto transfer = photograph.attributes.find("transfer");
   const bool coded = transfer != photograph.attributes.end() && transfer->second == "sRGB";
@@ -74,14 +75,14 @@ Canvas backdrop(const Image& photograph, int n) {
     if (at != sorted.end()) std::nth_element(sorted.begin(), at, sorted.end());
     white = at != sorted.end() && *at > 0.0f ? *at : 1.0;
   }
-  Canvas canvas{photograph.width / n, photograph.height / n, {}};
+  Canvas canvas{photograph.width / n * m, photograph.height / n * m, {}};
   for (int y = 0; y < canvas.height; ++y)
     for (int x = 0; x < canvas.width; ++x)
       for (std::size_t c = 0; c < 3; ++c) {
         const auto& plane = planes[planes.size() == 3 ? c : 0];
         double sum = 0.0;
         for (int k = 0; k < n * n; ++k) {
-          const float v = plane[photograph.index(x * n + k % n, y * n + k / n)];
+          const float v = plane[photograph.index(x / m * n + k % n, y / m * n + k / n)];
           sum += std::isfinite(v) ? v : 0.0f;
         }
         const double v = sum / (n * n) / white;
@@ -97,10 +98,13 @@ Picture line_overlay(const Image& photograph, const std::vector<OverlayLine>& li
                      std::string note) {
   int n = 1;
   while (std::max(photograph.width, photograph.height) > most_px * n) ++n;
-  Canvas canvas = backdrop(photograph, n);
+  int m = 1;
+  while (2 * m * std::max(photograph.width, photograph.height) <= most_px) m *= 2;
+  const double scale = double(m) / n;
+  Canvas canvas = backdrop(photograph, n, m);
   for (const OverlayLine& line : lines)
-    canvas.draw(line.from.x_px / n, line.from.y_px / n, line.to.x_px / n, line.to.y_px / n,
-                line.colour);
+    canvas.draw(scale * line.from.x_px, scale * line.from.y_px, scale * line.to.x_px,
+                scale * line.to.y_px, line.colour);
   return plain_picture(canvas.width, canvas.height, canvas.rgb, std::move(note));
 }
 

@@ -102,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(AlignBox, AlignBoxFrom,
                                          Start{{-1, 1, 1}, -10.0, {0, 0, 1}, 0.9}));
 
 TEST(AlignBox, CovarianceCoversTheTruth) {
-  constexpr std::size_t kTrials = 40;
+  constexpr std::size_t kTrials = 25;
   const Scene scene = test_box();
   const CameraDescription truth = distorted_camera();
   AlignmentOptions options;
@@ -299,10 +299,14 @@ TEST(AlignBox, RealPhotographOfAPhysicalBox) {
   std::printf("real box: %.2f px rms, %.2f px by cameras fitted without the border (at 750 px)\n",
               kPublished * found.rms_px, kPublished * found.cross_validated_rms_px);
   EXPECT_LT(kPublished * found.cross_validated_rms_px, 1.0);
-  options.hold_out = {"back/*"};  // the edges that the published camera misses by 10 to 12 px
+  // Two of the four edges that the published camera misses by 10 to 12 px; without any of them only
+  // four lines into the depth would be left.
+  options.hold_out = {"back/left", "back/ceiling"};
   const BoxAlignment blind = align_box(scene, guess, photo, options);
   ASSERT_EQ(blind.outcome, AlignmentOutcome::converged) << blind.message;
-  std::printf("back wall held out: %.2f px rms (at 750 px)\n", kPublished * blind.held_out_rms_px);
+  std::printf("back/left and back/ceiling held out: %.2f px rms (at 750 px)\n",
+              kPublished * blind.held_out_rms_px);
+  EXPECT_LT(kPublished * blind.held_out_rms_px, 1.0);
 }
 
 }  // namespace
