@@ -13,20 +13,24 @@ namespace truebox {
 namespace {
 
 constexpr std::size_t kReadings = 256, kMiddle = 128;
-constexpr int kSide = 14;        // 196 pixels: Debevec's system has 256 + 196 unknowns
-constexpr int kSquareSide = 40;  // Robertson averages over all pixels given
+constexpr int kSide = 10;        // 100 pixels: Debevec's system has 256 + 100 unknowns
+constexpr int kSquareSide = 64;  // Robertson averages over all pixels given
 
 using Curve = std::vector<double>;  // kReadings signals; empty: not recovered
 
 Curve recovered(const std::vector<const Frame*>& frames, const std::vector<std::size_t>& pixels,
                 int side, ResponseMethod method) {
+  // OpenCV 4.6's Robertson writes three channels whatever the picture has.
+  const int channels = method == ResponseMethod::robertson ? 3 : 1;
   std::vector<cv::Mat> pictures;
   std::vector<float> times;
   for (const Frame* frame : frames) {
-    cv::Mat picture(side, side, CV_8UC1);
+    cv::Mat picture(side, side, CV_8UC(channels));
     for (int k = 0; k < side * side; ++k)
-      picture.data[k] = static_cast<std::uint8_t>(std::clamp(
-          frame->image.channels[0].samples[pixels[static_cast<std::size_t>(k)]], 0.0f, 255.0f));
+      std::fill_n(picture.data + channels * k, channels,
+                  static_cast<std::uint8_t>(std::clamp(
+                      frame->image.channels[0].samples[pixels[static_cast<std::size_t>(k)]], 0.0f,
+                      255.0f)));
     pictures.push_back(picture);
     times.push_back(static_cast<float>(frame->exposure_s));
   }
@@ -39,10 +43,10 @@ Curve recovered(const std::vector<const Frame*>& frames, const std::vector<std::
   } catch (const cv::Exception&) {
     return {};
   }
-  if (response.total() != kReadings || response.type() != CV_32FC1) return {};
+  if (response.total() != kReadings || response.type() != CV_32FC(channels)) return {};
   Curve curve(kReadings);
   for (std::size_t r = 0; r < kReadings; ++r)
-    curve[r] = double{response.at<float>(static_cast<int>(r))};
+    curve[r] = double{response.ptr<float>(static_cast<int>(r))[0]};
   return curve;
 }
 
@@ -75,6 +79,27 @@ double make_rising(Curve& curve) {
       curve[r] = v;
     }
   return largest;
+}
+
+/// Readings that no pixel held have no signal: a geometric step between their neighbours, the
+/// nearest one's at the ends. False if under half of them have one.
+bool fill_gaps(Curve& curve) {
+  std::vector<std::size_t> known;
+  for (std::size_t r = 0; r < curve.size(); ++r)
+    if (std::isfinite(curve[r]) && curve[r] > 0.0) known.push_back(r);
+  if (known.size() < kReadings / 2) return false;
+  for (std::size_t r = 0; r < curve.size(); ++r) {
+    const auto next = std::lower_bound(known.begin(), known.end(), r);
+    if (next != known.end() && *next == r) continue;
+    if (next == known.begin() || next == known.end()) {
+      curve[r] = next == known.end() ? curve[known.back()] : curve[known.front()];
+      continue;
+    }
+    const std::size_t low = *(next - 1), high = *next;
+    const double share = static_cast<double>(r - low) / static_cast<double>(high - low);
+    curve[r] = std::pow(curve[low], 1.0 - share) * std::pow(curve[high], share);
+  }
+  return true;
 }
 
 /// Scales the curve so that its middle reading means itself; false if it is no curve.
@@ -148,7 +173,7 @@ ResponseCurve recover_response(const std::vector<Frame>& frames, ResponseMethod 
   const auto count = static_cast<std::size_t>(side * side);
   const auto draw = [&](const std::vector<const Frame*>& some) {
     Curve curve = recovered(some, stratified(ordered, count, random), side, method);
-    return normalise(curve) ? curve : Curve{};
+    return !curve.empty() && fill_gaps(curve) && normalise(curve) ? curve : Curve{};
   };
   // The mean over resamplings is the curve: it uses many more pixels than one set holds.
   Curve mean(kReadings, 0.0), squares(kReadings, 0.0);

@@ -31,7 +31,7 @@ struct ResponseCurve {
 /// Sources: Debevec, Malik (1997), SIGGRAPH; Robertson, Borman, Stevenson (2003), J. Electron.
 /// Imaging 12(2); Efron, Tibshirani (1993), An Introduction to the Bootstrap, ch. 6 and 11.
 ResponseCurve recover_response(const std::vector<Frame>& frames, ResponseMethod method,
-                               std::uint64_t seed = 1, int resamplings = 24);
+                               std::uint64_t seed = 1, int resamplings = 16);
 
 /// The curve as a camera's response: signals of readings outside of [lowest, highest] are the
 /// curve's, but a merge should leave them out (`floor_dn`, `saturation_dn`).

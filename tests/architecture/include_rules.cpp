@@ -71,6 +71,7 @@ const std::vector<ThirdParty>& third_parties() {
       {"half.h", {"solver/image"}},  // Imath's
       {"png.h", {"solver/image"}},
       {"tiff", {"solver/image"}},
+      {"libraw/", {"solver/image"}},
       {"toml++/", {"solver/scene", "reference/readings"}},
       {"ceres/", {"calibration/fit"}},
       {"OpenColorIO/", {"reports/colour"}},
