@@ -185,10 +185,11 @@ Figure response_figure(const InstrumentCalibration& instrument) {
     curve.y.push_back(instrument.curve.signal_dn[r].value);
     curve.u_y.push_back(instrument.curve.signal_dn[r].standard_uncertainty);
   }
-  return {"Response",
-          to_svg({"Response curve", {"reading", "DN"}, {"signal", "DN"}, {std::move(curve)}}),
-          "The signal of each reading, up to a scale that makes reading 128 the signal 128; "
-          "ribbon: u, k = 1."};
+  return {
+      "Response",
+      to_svg({"Response curve", {"reading", "DN"}, {"signal", "DN"}, {std::move(curve)}}),
+      "The signal of each reading, up to a scale that makes the middle readings mean themselves; "
+      "ribbon: u, k = 1."};
 }
 
 Paragraph linearity_text(const PhotometricCalibration& calibration) {
@@ -269,9 +270,11 @@ Report calibration_report(const PhotometricCalibration& calibration) {
   camera.blocks.push_back(noise_table(calibration));
   if (const double scatter = largest_dispersion(calibration); scatter > 1.5)
     camera.blocks.push_back(Paragraph{fmt::format(
-        "The variances of single blocks scatter {:.1f} times as much as noise alone would: rounding "
+        "The variances of single blocks scatter {:.1f} times as much as noise alone would: "
+        "rounding "
         "is coarser than the noise and repeats from photosite to photosite. Means over many blocks "
-        "hold, single groups below may not; the uncertainties of gain and floor are enlarged for it.",
+        "hold, single groups below may not; the uncertainties of gain and floor are enlarged for "
+        "it.",
         std::sqrt(scatter))});
   camera.blocks.push_back(held_out_table(calibration));
   Section photographs{"The photographs", {photograph_table(calibration)}};

@@ -12,9 +12,10 @@
 namespace truebox {
 namespace {
 
-constexpr std::size_t kReadings = 256, kMiddle = 128;
-constexpr int kSide = 10;        // 100 pixels: Debevec's system has 256 + 100 unknowns
-constexpr int kSquareSide = 64;  // Robertson averages over all pixels given
+constexpr std::size_t kReadings = 256, kMiddle = 128, kUnitReadings = 16;
+constexpr double kLevel = 1.0 + 1e-4;  // above the ties that make_rising parts
+constexpr int kSide = 10;              // 100 pixels: Debevec's system has 256 + 100 unknowns
+constexpr int kSquareSide = 64;        // Robertson averages over all pixels given
 
 using Curve = std::vector<double>;  // kReadings signals; empty: not recovered
 
@@ -102,10 +103,15 @@ bool fill_gaps(Curve& curve) {
   return true;
 }
 
-/// Scales the curve so that its middle reading means itself; false if it is no curve.
+/// Scales the curve so that the middle readings mean themselves, in the geometric mean of 32 of
+/// them: one reading alone is too noisy a unit. False if it is no curve.
 bool normalise(Curve& curve) {
-  if (curve.empty() || !std::isfinite(curve[kMiddle]) || !(curve[kMiddle] > 0.0)) return false;
-  const double scale = static_cast<double>(kMiddle) / curve[kMiddle];
+  double logs = 0.0;
+  for (std::size_t r = kMiddle - kUnitReadings; r <= kMiddle + kUnitReadings; ++r) {
+    if (curve.size() != kReadings || !std::isfinite(curve[r]) || !(curve[r] > 0.0)) return false;
+    logs += std::log(static_cast<double>(r) / curve[r]);
+  }
+  const double scale = std::exp(logs / static_cast<double>(2 * kUnitReadings + 1));
   for (double& v : curve) {
     v *= scale;
     if (!std::isfinite(v)) return false;
@@ -221,6 +227,10 @@ ResponseCurve recover_response(const std::vector<Frame>& frames, ResponseMethod 
   while (result.highest > kMiddle && held[result.highest] == 0) --result.highest;
   result.largest_repair = make_rising(mean);
   normalise(mean);
+  // Readings at the ends that all stand for one signal tell nothing apart.
+  const auto level = [&](std::size_t r) { return mean[r + 1] < mean[r] * kLevel; };
+  while (result.lowest < kMiddle && level(result.lowest)) ++result.lowest;
+  while (result.highest > kMiddle && level(result.highest - 1)) --result.highest;
   for (std::size_t r = 0; r < kReadings; ++r)
     result.signal_dn.push_back({mean[r], r >= result.lowest && r <= result.highest
                                              ? std::sqrt(variance[r])

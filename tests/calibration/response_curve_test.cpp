@@ -19,8 +19,12 @@ namespace {
 /// What a tone-mapping camera writes of a relative exposure of 0 to 1: a power law with a shoulder.
 double tone_mapped(double x) { return 255.0 * std::pow(std::min(x, 1.0), 1.0 / 2.2); }
 
-/// The signal of a reading, 128 at 128.
-double true_signal(double reading) { return 128.0 * std::pow(reading / 128.0, 2.2); }
+/// The signal of a reading; readings 112 to 144 mean themselves in the geometric mean.
+double true_signal(double reading) {
+  double logs = 0.0;
+  for (int r = 112; r <= 144; ++r) logs += std::log(r / std::pow(r, 2.2)) / 33.0;
+  return std::exp(logs) * std::pow(reading, 2.2);
+}
 
 std::vector<Frame> simulated_series(unsigned seed, const std::vector<double>& exposures_s) {
   std::mt19937_64 random(seed);
@@ -61,18 +65,18 @@ TEST_P(Recovery, FindsThePowerLawWithinItsUncertainty) {
     n += 1.0;
   }
   EXPECT_LT(z2 / n, 2.0);  // readings are correlated: no sharper than this
-  EXPECT_LT(mean_relative_u, GetParam() == ResponseMethod::debevec ? 0.03 : 0.10);
+  EXPECT_LT(mean_relative_u, GetParam() == ResponseMethod::debevec ? 0.03 : 0.2);
 }
 
 TEST_P(Recovery, Rises) {
-  const ResponseCurve curve = recover_response(simulated_series(4, {1.0, 4.0}), GetParam());
+  const ResponseCurve curve = recover_response(simulated_series(4, {1.0, 4.0}), GetParam(), 1, 4);
   ASSERT_TRUE(curve.found) << curve.why_not;
   for (std::size_t r = 1; r < 256; ++r)
     EXPECT_GT(curve.signal_dn[r].value, curve.signal_dn[r - 1].value) << r;
   const CameraResponse response = to_camera_response(curve);
   for (double reading : {10.0, 100.5, 200.25})
     EXPECT_NEAR(response.reading_dn(response.linear_dn(reading)), reading, 1e-6);
-  EXPECT_EQ(recover_response(simulated_series(4, {1.0, 4.0}), GetParam()).signal_dn[77].value,
+  EXPECT_EQ(recover_response(simulated_series(4, {1.0, 4.0}), GetParam(), 1, 4).signal_dn[77].value,
             curve.signal_dn[77].value);  // one seed, one curve
 }
 
