@@ -99,6 +99,14 @@ Table held_out_table(const PhotometricCalibration& calibration) {
   return table;
 }
 
+double largest_dispersion(const PhotometricCalibration& calibration) {
+  double largest = 0.0;
+  for (const InstrumentCalibration& instrument : calibration.instruments)
+    for (const SiteNoise& noise : instrument.noise)
+      largest = std::max(largest, noise.transfer.dispersion);
+  return largest;
+}
+
 Table budget_table(const LinearPhotograph& p) {
   Table table{fmt::format("{}: budget of one photosite at {:.4g} {} (the median); k = 1", p.band,
                           p.reference_value, p.unit),
@@ -177,10 +185,11 @@ Figure response_figure(const InstrumentCalibration& instrument) {
     curve.y.push_back(instrument.curve.signal_dn[r].value);
     curve.u_y.push_back(instrument.curve.signal_dn[r].standard_uncertainty);
   }
-  return {"Response",
-          to_svg({"Response curve", {"reading", "DN"}, {"signal", "DN"}, {std::move(curve)}}),
-          "The signal of each reading, up to a scale that makes reading 128 the signal 128; "
-          "ribbon: u, k = 1."};
+  return {
+      "Response",
+      to_svg({"Response curve", {"reading", "DN"}, {"signal", "DN"}, {std::move(curve)}}),
+      "The signal of each reading, up to a scale that makes the middle readings mean themselves; "
+      "ribbon: u, k = 1."};
 }
 
 Paragraph linearity_text(const PhotometricCalibration& calibration) {
@@ -259,6 +268,14 @@ Report calibration_report(const PhotometricCalibration& calibration) {
     if (instrument.curve.found) camera.blocks.push_back(response_figure(instrument));
   }
   camera.blocks.push_back(noise_table(calibration));
+  if (const double scatter = largest_dispersion(calibration); scatter > 1.5)
+    camera.blocks.push_back(Paragraph{fmt::format(
+        "The variances of single blocks scatter {:.1f} times as much as noise alone would: "
+        "rounding "
+        "is coarser than the noise and repeats from photosite to photosite. Means over many blocks "
+        "hold, single groups below may not; the uncertainties of gain and floor are enlarged for "
+        "it.",
+        std::sqrt(scatter))});
   camera.blocks.push_back(held_out_table(calibration));
   Section photographs{"The photographs", {photograph_table(calibration)}};
   Section budgets{"Uncertainty budgets", {}};

@@ -98,7 +98,8 @@ double CameraResponse::slope(double signal_dn) const {
   if (!table_dn.empty()) {
     const double last = static_cast<double>(table_dn.size() - 1);
     const double r = table_position(table_dn, signal_dn);
-    const double a = std::max(r - 1.0, 0.0), b = std::min(r + 1.0, last);
+    // Over 16 readings: where the table is nearly level, a step of it is no slope.
+    const double a = std::max(r - 8.0, 0.0), b = std::min(r + 8.0, last);
     return (b - a) / (linear_dn(b) - linear_dn(a));
   }
   return std::max(1.0 - 2.0 * curvature_per_dn.value * signal_dn, 1e-3);

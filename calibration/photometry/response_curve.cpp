@@ -12,21 +12,26 @@
 namespace truebox {
 namespace {
 
-constexpr std::size_t kReadings = 256, kMiddle = 128;
-constexpr int kSide = 14;        // 196 pixels: Debevec's system has 256 + 196 unknowns
-constexpr int kSquareSide = 40;  // Robertson averages over all pixels given
+constexpr std::size_t kReadings = 256, kMiddle = 128, kUnitReadings = 16;
+constexpr double kLevel = 1.0 + 1e-4;  // above the ties that make_rising parts
+constexpr int kSide = 10;              // 100 pixels: Debevec's system has 256 + 100 unknowns
+constexpr int kSquareSide = 64;        // Robertson averages over all pixels given
 
 using Curve = std::vector<double>;  // kReadings signals; empty: not recovered
 
 Curve recovered(const std::vector<const Frame*>& frames, const std::vector<std::size_t>& pixels,
                 int side, ResponseMethod method) {
+  // OpenCV 4.6's Robertson writes three channels whatever the picture has.
+  const int channels = method == ResponseMethod::robertson ? 3 : 1;
   std::vector<cv::Mat> pictures;
   std::vector<float> times;
   for (const Frame* frame : frames) {
-    cv::Mat picture(side, side, CV_8UC1);
+    cv::Mat picture(side, side, CV_8UC(channels));
     for (int k = 0; k < side * side; ++k)
-      picture.data[k] = static_cast<std::uint8_t>(std::clamp(
-          frame->image.channels[0].samples[pixels[static_cast<std::size_t>(k)]], 0.0f, 255.0f));
+      std::fill_n(picture.data + channels * k, channels,
+                  static_cast<std::uint8_t>(std::clamp(
+                      frame->image.channels[0].samples[pixels[static_cast<std::size_t>(k)]], 0.0f,
+                      255.0f)));
     pictures.push_back(picture);
     times.push_back(static_cast<float>(frame->exposure_s));
   }
@@ -39,10 +44,10 @@ Curve recovered(const std::vector<const Frame*>& frames, const std::vector<std::
   } catch (const cv::Exception&) {
     return {};
   }
-  if (response.total() != kReadings || response.type() != CV_32FC1) return {};
+  if (response.total() != kReadings || response.type() != CV_32FC(channels)) return {};
   Curve curve(kReadings);
   for (std::size_t r = 0; r < kReadings; ++r)
-    curve[r] = double{response.at<float>(static_cast<int>(r))};
+    curve[r] = double{response.ptr<float>(static_cast<int>(r))[0]};
   return curve;
 }
 
@@ -77,10 +82,36 @@ double make_rising(Curve& curve) {
   return largest;
 }
 
-/// Scales the curve so that its middle reading means itself; false if it is no curve.
+/// Readings that no pixel held have no signal: a geometric step between their neighbours, the
+/// nearest one's at the ends. False if under half of them have one.
+bool fill_gaps(Curve& curve) {
+  std::vector<std::size_t> known;
+  for (std::size_t r = 0; r < curve.size(); ++r)
+    if (std::isfinite(curve[r]) && curve[r] > 0.0) known.push_back(r);
+  if (known.size() < kReadings / 2) return false;
+  for (std::size_t r = 0; r < curve.size(); ++r) {
+    const auto next = std::lower_bound(known.begin(), known.end(), r);
+    if (next != known.end() && *next == r) continue;
+    if (next == known.begin() || next == known.end()) {
+      curve[r] = next == known.end() ? curve[known.back()] : curve[known.front()];
+      continue;
+    }
+    const std::size_t low = *(next - 1), high = *next;
+    const double share = static_cast<double>(r - low) / static_cast<double>(high - low);
+    curve[r] = std::pow(curve[low], 1.0 - share) * std::pow(curve[high], share);
+  }
+  return true;
+}
+
+/// Scales the curve so that the middle readings mean themselves, in the geometric mean of 32 of
+/// them: one reading alone is too noisy a unit. False if it is no curve.
 bool normalise(Curve& curve) {
-  if (curve.empty() || !std::isfinite(curve[kMiddle]) || !(curve[kMiddle] > 0.0)) return false;
-  const double scale = static_cast<double>(kMiddle) / curve[kMiddle];
+  double logs = 0.0;
+  for (std::size_t r = kMiddle - kUnitReadings; r <= kMiddle + kUnitReadings; ++r) {
+    if (curve.size() != kReadings || !std::isfinite(curve[r]) || !(curve[r] > 0.0)) return false;
+    logs += std::log(static_cast<double>(r) / curve[r]);
+  }
+  const double scale = std::exp(logs / static_cast<double>(2 * kUnitReadings + 1));
   for (double& v : curve) {
     v *= scale;
     if (!std::isfinite(v)) return false;
@@ -148,7 +179,7 @@ ResponseCurve recover_response(const std::vector<Frame>& frames, ResponseMethod 
   const auto count = static_cast<std::size_t>(side * side);
   const auto draw = [&](const std::vector<const Frame*>& some) {
     Curve curve = recovered(some, stratified(ordered, count, random), side, method);
-    return normalise(curve) ? curve : Curve{};
+    return !curve.empty() && fill_gaps(curve) && normalise(curve) ? curve : Curve{};
   };
   // The mean over resamplings is the curve: it uses many more pixels than one set holds.
   Curve mean(kReadings, 0.0), squares(kReadings, 0.0);
@@ -196,6 +227,10 @@ ResponseCurve recover_response(const std::vector<Frame>& frames, ResponseMethod 
   while (result.highest > kMiddle && held[result.highest] == 0) --result.highest;
   result.largest_repair = make_rising(mean);
   normalise(mean);
+  // Readings at the ends that all stand for one signal tell nothing apart.
+  const auto level = [&](std::size_t r) { return mean[r + 1] < mean[r] * kLevel; };
+  while (result.lowest < kMiddle && level(result.lowest)) ++result.lowest;
+  while (result.highest > kMiddle && level(result.highest - 1)) --result.highest;
   for (std::size_t r = 0; r < kReadings; ++r)
     result.signal_dn.push_back({mean[r], r >= result.lowest && r <= result.highest
                                              ? std::sqrt(variance[r])

@@ -13,13 +13,14 @@ namespace truebox {
 enum class ResponseMethod { debevec, robertson };
 
 /// The signal that each of the 256 readings of a tone-mapped file stands for, in units that make
-/// reading 128 the signal 128 (exposure series fix the curve up to a scale).
+/// readings 112 to 144 mean themselves in the geometric mean (exposure series fix the curve up to a
+/// scale).
 struct ResponseCurve {
   bool found = false;
   std::string why_not;
   std::vector<Estimate> signal_dn;        ///< 256, rising; u: pixel sets and frames, see below
   double largest_repair = 0.0;            ///< relative change that making the curve rise took
-  std::size_t lowest = 0, highest = 255;  ///< readings that the frames hold; beyond, u is infinite
+  std::size_t lowest = 0, highest = 255;  ///< readings held and told apart; beyond, u is infinite
 };
 
 /// Recovers the curve from frames of one still scene (8 bit, at least two exposures), made rising
@@ -31,7 +32,7 @@ struct ResponseCurve {
 /// Sources: Debevec, Malik (1997), SIGGRAPH; Robertson, Borman, Stevenson (2003), J. Electron.
 /// Imaging 12(2); Efron, Tibshirani (1993), An Introduction to the Bootstrap, ch. 6 and 11.
 ResponseCurve recover_response(const std::vector<Frame>& frames, ResponseMethod method,
-                               std::uint64_t seed = 1, int resamplings = 24);
+                               std::uint64_t seed = 1, int resamplings = 16);
 
 /// The curve as a camera's response: signals of readings outside of [lowest, highest] are the
 /// curve's, but a merge should leave them out (`floor_dn`, `saturation_dn`).

@@ -17,6 +17,10 @@ Image read_jpeg(const std::filesystem::path& path);
 Image read_png(const std::filesystem::path& path);
 Image read_tiff(const std::filesystem::path& path);
 
+/// A camera's RAW file: by its ending, or a TIFF that names a DNG version.
+bool is_raw(const std::filesystem::path& path);
+Image read_raw(const std::filesystem::path& path);
+
 /// 16-bit samples, `planes` interleaved.
 std::vector<std::uint8_t> encode_png16(int width, int height, int planes,
                                        const std::vector<std::uint16_t>& samples,

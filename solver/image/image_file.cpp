@@ -29,12 +29,13 @@ Image read_image(const std::filesystem::path& path) {
   };
   if (starts_with({0x76, 0x2f, 0x31, 0x01})) return codecs::read_exr(path);
   if (starts_with({0x89, 'P', 'N', 'G'})) return codecs::read_png(path);
+  if (codecs::is_raw(path)) return codecs::read_raw(path);
   if (starts_with({'I', 'I', 42, 0}) || starts_with({'M', 'M', 0, 42}))
     return codecs::read_tiff(path);
   if (starts_with({0xff, 0xd8, 0xff})) return codecs::read_jpeg(path);
   if (starts_with({'#', '?', 'R', 'A'}) || starts_with({'#', '?', 'R', 'G'}))
     return codecs::read_hdr(path);
-  throw InputError(path.string(), 0, "an OpenEXR, PNG, TIFF, JPEG or Radiance image",
+  throw InputError(path.string(), 0, "an OpenEXR, PNG, TIFF, JPEG, Radiance or RAW image",
                    "another kind of file");
 }
 

@@ -11,11 +11,16 @@
 namespace truebox {
 
 /// Reads EXR (half, float or integer), PNG (8 or 16 bit), TIFF (8 or 16 bit, float), JPEG (grey or
-/// RGB, upright as its Exif says) or Radiance pictures (EXPOSURE divided out), by content. Integer samples keep their digital numbers (DN),
-/// nothing is linearised or scaled, NaN and Inf stay; palette PNGs keep their indices.
+/// RGB, upright as its Exif says) or Radiance pictures (EXPOSURE divided out), by content. RAW files
+/// of cameras (DNG by content, others by their ending) give the photosites of the visible area as
+/// they were read, not demosaiced, not scaled, black level not subtracted: one channel "Y",
+/// attributes "bayer", "white_level_dn", where the file states them "black_level_dn" (one for all
+/// photosites) and "exposure_s". Integer samples keep their digital numbers (DN), nothing is
+/// linearised or scaled, NaN and Inf stay; palette PNGs keep their indices.
 /// Of an EXR with several parts, the first part's channels keep their names, others are called
-/// "<part>.<channel>". InputError: missing, truncated, of another kind; EXR parts that are deep
-/// (several samples a pixel) or of different windows, which are no one image.
+/// "<part>.<channel>". InputError: missing, truncated, of another kind; RAW data that is no 2 x 2
+/// mosaic; EXR parts that are deep (several samples a pixel) or of different windows, which are no
+/// one image.
 Image read_image(const std::filesystem::path& path);
 
 /// Writes float32 OpenEXR (ZIP), text attributes included; chromaticities are BT.709's, attribute

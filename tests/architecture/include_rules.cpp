@@ -78,6 +78,7 @@ const std::vector<ThirdParty>& third_parties() {
       {"png.h", {"solver/image"}},
       {"jpeglib.h", {"solver/image"}},
       {"tiff", {"solver/image"}},
+      {"libraw/", {"solver/image"}},
       {"toml++/", {"solver/scene", "reference/readings"}},
       {"ceres/", {"calibration/fit", "calibration/alignment"}},
       {"OpenColorIO/", {"reports/colour"}},

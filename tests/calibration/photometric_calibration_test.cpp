@@ -9,6 +9,7 @@
 #include "calibration/simulated_frames.h"
 #include "image/image_file.h"
 #include "radiometry/input_error.h"
+#include "support/dng.h"
 #include "support/scratch.h"
 
 namespace truebox {
@@ -231,6 +232,26 @@ TEST(PhotometricCalibration, GainZeroIsACameraWithoutPhotonNoise) {
                                     "bits = 8\nbayer = \"none\"\nsaturation_dn = 250\ngain = 0\n"
                                     "read_noise = 1\n");
   EXPECT_FLOAT_EQ(p.u_noise[0], p.u_noise[1]);
+}
+
+// A RAW file brings its mosaic and its black level along; a measurement that says otherwise is
+// refused.
+TEST(PhotometricCalibration, TakesTheBlackLevelOfARawFile) {
+  const auto bytes = dng_bytes(32, 24, std::vector<std::uint16_t>(32 * 24, 564), "grbg", 64, 16000);
+  std::ofstream(scratch_path("one.dng"), std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<long>(bytes.size()));
+  const std::string band =
+      "[[bands]]\nname = \"b\"\nphotographs = [{ file = \"one.dng\", exposure_s = 0.5 }]\n";
+  const std::string stated =
+      "bits = 14\nsaturation_dn = 15900\ngain = 0.5\nread_noise = 3\nbayer = ";
+  const auto calibration =
+      calibrate_photographs(read_measurement(measurement("raw.toml", stated + "\"grbg\"\n", band)));
+  EXPECT_FLOAT_EQ(calibration.photographs[0].value[100], 1000.0f);
+  EXPECT_NEAR(calibration.photographs[0].u_noise[100], 2.0 * std::sqrt(9.0 + 1.0 / 12 + 250.0),
+              1e-3);
+  EXPECT_THROW(calibrate_photographs(
+                   read_measurement(measurement("raw2.toml", stated + "\"rggb\"\n", band))),
+               InputError);
 }
 
 TEST(PhotometricCalibration, RefusesToInventNoise) {

@@ -97,5 +97,61 @@ TEST(MeasurementFile, NamesAMissingFile) {
   }
 }
 
+std::string written(const std::string& name, const std::string& text) {
+  const std::string path = scratch_path(name + ".toml");
+  std::ofstream(path) << text;
+  std::ofstream(scratch_path("frame.png")) << "no picture is opened";
+  return path;
+}
+
+const std::string kPlain =
+    "title = \"t\"\nsource = \"s\"\n[instrument]\nbits = 16\nbayer = \"none\"\n"
+    "saturation_dn = 60000\n[[bands]]\nname = \"b\"\nphotographs = [{ file = \"frame.png\", "
+    "exposure_s = 1 }]\n";
+
+TEST(MeasurementFile, NeedsNoChart) {
+  const MeasurementFile file = read_measurement(written("plain", kPlain));
+  EXPECT_FALSE(file.has_chart());
+  EXPECT_FALSE(file.instrument.mosaic);
+  EXPECT_EQ(file.instrument.response, "fitted");
+  EXPECT_EQ(file.glare.region.width, 0);
+}
+
+TEST(MeasurementFile, ReadsFlatGlareAndScale) {
+  const MeasurementFile file = read_measurement(written(
+      "full", kPlain + "[flat]\nfiles = [\"frame.png\"]\nexposure_s = 2\nmodel = \"cos4\"\n"
+                       "uncertainty = 0.01\n[defects]\nmask = \"frame.png\"\n[glare]\nregion = "
+                       "[1, 2, 3, 4]\n[[scale]]\nregion = [0, 0, 2, 2]\nvalue = 80\nuncertainty = "
+                       "2\nunit = \"cd m^-2\"\n"));
+  EXPECT_EQ(file.flat.model, "cos4");
+  EXPECT_FALSE(file.defect_mask.empty());
+  EXPECT_EQ(file.glare.region.height, 4);
+  ASSERT_EQ(file.scales.size(), 1u);
+  EXPECT_EQ(file.scales[0].value.standard_uncertainty, 2.0);
+}
+
+TEST(MeasurementFile, RefusesWhatCalibrationCannotMean) {
+  const std::vector<std::pair<std::string, std::string>> mistakes = {
+      {"[glare]\nregion = [1, 2, 3]\n", "left, top, width, height"},
+      {"[flat]\nfiles = [\"frame.png\"]\nexposure_s = 1\nuncertainty = 0\nmodel = \"even\"\n",
+       "polynomial"},
+      {"[[scale]]\npatch = \"white\"\nvalue = 1\nuncertainty = 0\nunit = \"1\"\n", "chart patch"},
+      {"[defects]\nmask = \"missing.png\"\n", "existing file"},
+      {"[[bands]]\nname = \"b\"\nphotographs = [{ file = \"frame.png\", exposure_s = 1 }]\n",
+       "different names"}};
+  for (const auto& [text, expected] : mistakes) {
+    try {
+      read_measurement(written("mistake", kPlain + text));
+      FAIL() << text;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(expected));
+      EXPECT_GT(error.line(), 0) << text;
+    }
+  }
+  std::string mosaic = kPlain;
+  mosaic.replace(mosaic.find("bits = 16"), 9, "response = \"debevec\"\nbits = 16");
+  EXPECT_THROW(read_measurement(written("deep", mosaic)), InputError);
+}
+
 }  // namespace
 }  // namespace truebox
