@@ -71,7 +71,7 @@ Canvas backdrop(const Image& photograph, int n, int m) {
     std::vector<float> sorted;
     for (float v : planes.back())
       if (std::isfinite(v)) sorted.push_back(v);
-    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(0.995 * double(sorted.size()));
+    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(0.98 * double(sorted.size()));
     if (at != sorted.end()) std::nth_element(sorted.begin(), at, sorted.end());
     white = at != sorted.end() && *at > 0.0f ? *at : 1.0;
   }

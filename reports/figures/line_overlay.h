@@ -18,9 +18,9 @@ struct OverlayLine {
 
 /// A photograph as a backdrop, dimmed so that lines stand out, with lines drawn over it; averaged
 /// down until no side exceeds `most_px`, or small ones doubled while none does. Display values
-/// (attribute "transfer") are shown as they are, linear ones scaled to their 99.5 % quantile and
-/// coded as sRGB. Lines are one pixel wide, anti-aliased. Without channels R, G, B the mean of all
-/// is shown as grey.
+/// (attribute "transfer") are shown as they are, linear ones scaled to their 98 % quantile (a lamp
+/// may be white) and coded as sRGB. Lines are one pixel wide, anti-aliased. Without channels R, G,
+/// B the mean of all is shown as grey.
 Picture line_overlay(const Image& photograph, const std::vector<OverlayLine>& lines, int most_px,
                      std::string note);
 

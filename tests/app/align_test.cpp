@@ -59,8 +59,8 @@ TEST(AlignCommand, FindsTheCameraOfAnIndependentRender) {
   std::ofstream(moved, std::ios::app)
       << "\n[cameras.guess]\nposition = [328, 253, -830]\ndirection = [-0.05, 0.02, 1]\n"
          "up = [0.03, 1, 0]\nfocal_length_mm = 36.7\nfilm_mm = [25, 25]\npixels = [256, 256]\n";
-  const Finished run = align("'" + moved + "' '" + photograph + "' --camera guess --lens fixed -o '" +
-                        directory + "'");
+  const Finished run = align("'" + moved + "' '" + photograph +
+                             "' --camera guess --lens fixed -o '" + directory + "'");
   ASSERT_EQ(run.code, 0) << run.text;
   EXPECT_THAT(run.text, HasSubstr("converged"));
   for (const char* name : {"alignment.json", "camera.toml", "overlay.png", "report.html"})
@@ -85,15 +85,62 @@ TEST(AlignCommand, FindsTheCameraOfAnIndependentRender) {
              std::pow(a.position.y_px - b.position.y_px, 2);
       n += 1.0;
     }
-  // Shading between walls is not linear, which moves edges by hundredths; the noise is 1 %.
-  EXPECT_LT(std::sqrt(sum / n), 0.1) << run.text;
+  // Shading between walls of one colour moves their edges by up to 0.13 px, and some of the corners
+  // lie in front of what is seen.
+  EXPECT_LT(std::sqrt(sum / n), 0.3) << run.text;
+  for (const auto& p : json["parameters"])
+    if (p["name"] == "focal length") {
+      EXPECT_NEAR(p["value"].get<double>(), 35.0 / 25.0 * 256.0, 3.0 * p["u"].get<double>());
+    }
+}
+
+// Corners that a person clicked on, a pixel off: no search is needed then.
+TEST(AlignCommand, TakesPickedPoints) {
+  const Scene scene = read_scene(kBox);
+  CameraDescription published = scene.cameras.begin()->second;
+  published.pixels = {256, 256};
+  const Camera camera(published);
+  const std::string points = scratch_path("points.csv");
+  {
+    std::ofstream csv(points);
+    csv << "name,x,y,z,x_px,y_px,u_px\n";
+    double off = 1.0;
+    for (const char* name : {"back_wall", "tall_block_top", "short_block_top"})
+      for (const Surface& surface : scene.surfaces)
+        if (surface.name == name)
+          for (const Vec3& v : surface.pieces[0]) {
+            const PixelPosition at = camera.project(v).position;
+            off = -off;
+            csv << name << ',' << v[0] / scene.metres_per_unit << ','
+                << v[1] / scene.metres_per_unit << ',' << v[2] / scene.metres_per_unit << ','
+                << at.x_px + off << ',' << at.y_px - off << ",1\n";
+          }
+  }
+  const std::string photograph =
+      std::string(TRUEBOX_REFERENCE_DIR) + "/independent_renders/cornell_box_front_256_7bands.exr";
+  const std::string directory = scratch_path("picked");
+  Finished run =
+      align("'" + kBox + "' '" + photograph + "' --camera front --lens fixed --points '" + points +
+            "' -o '" + directory + "'");
+  ASSERT_EQ(run.code, 0) << run.text;
+  const auto json = json_of(directory + "/alignment.json");
+  ASSERT_GE(json["residuals"]["points_px"].size(), 8u);
+  for (const auto& distance : json["residuals"]["points_px"])
+    EXPECT_NEAR(distance.get<double>(), std::sqrt(2.0), 0.7);  // the edges know better
+  std::ofstream(points) << "name,x,y,z,x_px,y_px,u_px\na,1,2,3,4,5,0\n";
+  run = align("'" + kBox + "' '" + photograph + "' --camera front --points '" + points + "'");
+  EXPECT_EQ(run.code, 4);
+  EXPECT_THAT(run.text, HasSubstr("u_px above 0"));
+  run = align("'" + kBox + "' '" + photograph + "' --camera side");
+  EXPECT_EQ(run.code, 4);
+  EXPECT_THAT(run.text, HasSubstr("[cameras.side]"));
 }
 
 TEST(AlignCommand, CalibratesTheLensFromChessboards) {
   const std::string directory = scratch_path("lens");
   const Finished run = align("--chessboard 9x6 --square 25mm '" + kBoards + "01.jpg' '" + kBoards +
-                        "03.jpg' '" + kBoards + "05.jpg' '" + kBoards + "08.jpg' '" + kBoards +
-                        "12.jpg' -o '" + directory + "'");
+                             "03.jpg' '" + kBoards + "05.jpg' '" + kBoards + "08.jpg' '" + kBoards +
+                             "12.jpg' -o '" + directory + "'");
   ASSERT_EQ(run.code, 0) << run.text;
   const auto json = json_of(directory + "/lens.json");
   EXPECT_EQ(json["outcome"], "converged");

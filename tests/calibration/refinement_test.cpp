@@ -100,8 +100,9 @@ TEST(ParameterCovariance, TakesCorrelationAlongEdgesIntoAccount) {
       "chi2/nu with errors correlated by 0.8: %.2f if taken as independent, %.2f as stated\n",
       naive.chi2_per_parameter, honest.chi2_per_parameter);
   EXPECT_GT(naive.chi2_per_parameter, 3.0);  // intervals would be half as wide as they should be
-  // Correlations are themselves estimated from the residuals, some of which the fit took away.
-  EXPECT_LT(honest.chi2_per_parameter, 1.6);
+  // Correlations are estimated from residuals, of which the fit has taken away what goes along all
+  // of an edge: what is stated stays short by up to a third, of a factor of 2.7.
+  EXPECT_LT(honest.chi2_per_parameter, 1.8);
   EXPECT_GT(honest.chi2_per_parameter, 0.5);
 }
 
