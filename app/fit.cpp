@@ -162,7 +162,8 @@ void add_fit_command(CLI::App& program, Action& chosen) {
                     "scene: does the data need interreflection, or more than one band?");
   command->footer(
       "Examples:\n  truebox fit reference/llanos_narrowband/measurement.toml -o fit.json\n"
-      "  truebox fit box.toml -o fit.json --report out/fit     box.toml names scene and photographs\n"
+      "  truebox fit box.toml -o fit.json --report out/fit     box.toml names scene and "
+      "photographs\n"
       "Ctrl-C ends the fit of a scene with the best so far. "
       "exit code 5 if a fit did not converge or is rank deficient (the null direction is named)");
   command->callback([arguments, &chosen] { chosen = [arguments] { return fit(*arguments); }; });
