@@ -73,6 +73,11 @@ void print_fit(const SceneFitRun& run) {
   if (fit.birge > 1.0)
     fmt::print("chi2/nu is above what chance explains: uncertainties enlarged by {:.2f}\n",
                fit.birge);
+  fmt::print("\n{:<20} {:>8} {:>8} {:>9} {:>9}\n", "surface", "readings", "mean / %", "chi2/n",
+             "max |z|");
+  for (const SurfaceResidual& r : surface_residuals(run))
+    fmt::print("{:<20} {:>8} {:>8.2f} {:>9.2f} {:>9.2f}\n", r.surface, r.readings, r.mean_percent,
+               r.chi2, r.farthest);
   if (!run.held_out.empty())
     fmt::print("held out: {} readings, rms {:.2f} %, {:.1f} % within U (k = 2)\n",
                run.held_out.size(), 100.0 * rms_relative(run.held_out),
@@ -95,6 +100,30 @@ double rms_relative(const std::vector<FittedReading>& readings) {
     value += r.value * r.value;
   }
   return value > 0.0 ? std::sqrt(sum / value) : 0.0;
+}
+
+std::vector<SurfaceResidual> surface_residuals(const SceneFitRun& run) {
+  const Scene& scene = *run.measurement.scene;
+  std::vector<SurfaceResidual> all(scene.surfaces.size());
+  std::vector<double> predicted(all.size(), 0.0), value = predicted;
+  for (const FittedReading& r : run.fit.readings) {
+    const std::size_t i = run.measurement.model->blocks()[r.block].surface;
+    SurfaceResidual& s = all[i];
+    ++s.readings;
+    value[i] += r.value;
+    predicted[i] += r.predicted;
+    s.chi2 += r.z() * r.z();
+    s.farthest = std::max(s.farthest, std::abs(r.z()));
+  }
+  std::vector<SurfaceResidual> seen;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all[i].readings == 0) continue;
+    all[i].surface = scene.surfaces[i].name;
+    all[i].mean_percent = 100.0 * (value[i] / predicted[i] - 1.0);
+    all[i].chi2 /= static_cast<double>(all[i].readings);
+    seen.push_back(all[i]);
+  }
+  return seen;
 }
 
 int fit_scene_measurement(const FitSceneArguments& arguments) {

@@ -34,6 +34,16 @@ struct SceneFitRun {
 double share_within(const std::vector<FittedReading>& readings);
 double rms_relative(const std::vector<FittedReading>& readings);
 
+/// How the readings of one surface, all planes together, fit.
+struct SurfaceResidual {
+  std::string surface;
+  std::size_t readings = 0;
+  double mean_percent = 0.0;  ///< mean reading over mean of the model, less 100 %
+  double chi2 = 0.0;          ///< a reading
+  double farthest = 0.0;      ///< largest |z|
+};
+std::vector<SurfaceResidual> surface_residuals(const SceneFitRun& run);
+
 nlohmann::json scene_fit_json(const SceneFitRun& run);
 Report scene_fit_report(const SceneFitRun& run);
 /// residuals.exr: for each plane reading, prediction, their difference and z, painted on the pixels

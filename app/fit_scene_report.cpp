@@ -92,6 +92,20 @@ Figure history_figure(const SceneFit& fit) {
   return {"Convergence", to_svg(plot), "chi2 of each step; a new search begins where it jumps."};
 }
 
+Table surface_table(const SceneFitRun& run) {
+  Table table{"Residuals of each surface, all planes",
+              {{"Surface"},
+               {"Readings"},
+               {"Mean reading over the model's, less 100 %", "%", 2, true},
+               {"chi2/n", "1", 2, true},
+               {"Largest |z|", "1", 1, true}},
+              {}};
+  for (const SurfaceResidual& r : surface_residuals(run))
+    table.rows.push_back(
+        {r.surface, std::to_string(r.readings), r.mean_percent, r.chi2, r.farthest});
+  return table;
+}
+
 PictureRow plane_pictures(const SceneFitRun& run, const Image& map, std::size_t k) {
   const auto& name = run.measurement.problem.planes[k].name;
   const auto [width, height] = run.measurement.size_px[k];
@@ -127,6 +141,24 @@ Table candidate_table(const std::vector<ModelCandidate>& candidates) {
     table.rows.push_back({c.name, std::to_string(c.parameters), c.aicc, c.bic,
                           100.0 * c.held_out_rms, c.held_out_chi2, c.chosen ? "chosen" : c.why});
   return table;
+}
+
+nlohmann::json readings_json(const SceneFitRun& run) {
+  nlohmann::json all = nlohmann::json::array();
+  const auto add = [&](const FittedReading& r, bool held_out) {
+    const ViewBlock& block = run.measurement.model->blocks()[r.block];
+    all.push_back({{"plane", run.measurement.problem.planes[r.plane].name},
+                   {"surface", run.measurement.scene->surfaces[block.surface].name},
+                   {"element", block.element},
+                   {"pixels", block.pixels.size()},
+                   {"value", r.value},
+                   {"predicted", r.predicted},
+                   {"u", r.standard_uncertainty},
+                   {"held_out", held_out}});
+  };
+  for (const FittedReading& r : run.fit.readings) add(r, false);
+  for (const FittedReading& r : run.held_out) add(r, true);
+  return all;
 }
 
 }  // namespace
@@ -212,6 +244,7 @@ Report scene_fit_report(const SceneFitRun& run) {
   if (!z.empty())
     residuals.blocks.push_back(Figure{"Residuals in u", z_histogram_svg("Residuals in u", z),
                                       "Readings of one surface share part of their error."});
+  residuals.blocks.push_back(surface_table(run));
   for (std::size_t k = 0; k < run.measurement.problem.planes.size(); ++k)
     residuals.blocks.push_back(plane_pictures(run, map, k));
   report.sections = {
@@ -280,6 +313,13 @@ nlohmann::json scene_fit_json(const SceneFitRun& run) {
                                {"chi2", s.chi2},
                                {"step_length", s.step},
                                {"gradient", s.gradient}});
+  json["all_readings"] = readings_json(run);
+  for (const SurfaceResidual& r : surface_residuals(run))
+    json["surfaces"].push_back({{"name", r.surface},
+                                {"readings", r.readings},
+                                {"mean_percent", r.mean_percent},
+                                {"chi2", r.chi2},
+                                {"largest_z", r.farthest}});
   for (const PlaneCounts& c : run.measurement.counts)
     json["planes"].push_back({{"name", c.name},
                               {"used", c.used},

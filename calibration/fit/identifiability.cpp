@@ -39,8 +39,7 @@ Identifiability identify(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd&
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(triangle, Eigen::ComputeFullV);
   const Eigen::VectorXd& s = svd.singularValues();
   const double ratio = s[p - 1] / s[0];
-  result.condition =
-      ratio > 0.0 ? 1.0 / (ratio * ratio) : std::numeric_limits<double>::infinity();
+  result.condition = ratio > 0.0 ? 1.0 / (ratio * ratio) : std::numeric_limits<double>::infinity();
   for (Index k = 0; k < p; ++k) {
     const Eigen::VectorXd direction = svd.matrixV().col(k);
     if (s[k] > rank_tolerance * s[0]) {

@@ -17,9 +17,9 @@ struct ParameterName {
 /// What the data say about parameters, from the whitened Jacobian (rows of unit variance, priors
 /// included).
 struct Identifiability {
-  Eigen::MatrixXd covariance;        ///< of what is determined; rows of what is not are 0
-  std::vector<char> determined;      ///< 0: part of a null direction
-  double condition = 0.0;            ///< of the column-scaled Jacobian, squared
+  Eigen::MatrixXd covariance;    ///< of what is determined; rows of what is not are 0
+  std::vector<char> determined;  ///< 0: part of a null direction
+  double condition = 0.0;        ///< of the column-scaled Jacobian, squared
   std::vector<Eigen::VectorXd> null_directions;
 };
 

@@ -21,8 +21,7 @@ void whiten(const Eigen::VectorXd& sigma, const std::vector<CommonMode>& regions
     if (!(square > 0.0)) continue;
     const double a = (1.0 - 1.0 / std::sqrt(1.0 + square)) / square;
     for (std::size_t k = 0; k < region.rows.size(); ++k)
-      rows.row(region.rows[k]) -=
-          a * region.common[k] / sigma[region.rows[k]] * product;
+      rows.row(region.rows[k]) -= a * region.common[k] / sigma[region.rows[k]] * product;
   }
 }
 

@@ -17,8 +17,8 @@ class ResponseCurve {
 
   struct Value {
     double reading = 0.0;
-    double by_exposure = 0.0;         ///< d reading / d exposure
-    std::vector<double> by_gamma;     ///< d reading / d gamma_j
+    double by_exposure = 0.0;      ///< d reading / d exposure
+    std::vector<double> by_gamma;  ///< d reading / d gamma_j
   };
   /// exposure > 0; at or below 0 the reading is 0.
   Value at(double exposure, const std::vector<double>& gammas) const;

@@ -59,7 +59,7 @@ struct FittedReading {
 struct SceneFit {
   FitSummary summary;
   std::vector<FittedParameter> parameters;
-  Eigen::MatrixXd covariance;   ///< of the parameters; 0 where no uncertainty is claimed
+  Eigen::MatrixXd covariance;  ///< of the parameters; 0 where no uncertainty is claimed
   Eigen::MatrixXd correlation;
   std::vector<std::string> null_directions;  ///< in words
   std::string weakest_direction;             ///< the least determined combination, in words

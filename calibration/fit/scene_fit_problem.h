@@ -52,7 +52,7 @@ struct ResponseChoice {
   Hold hold = Hold::free;
   int segments = 1;
   double decades = 2.0;
-  double white = 1.0;  ///< reading and exposure at which the curve is anchored
+  double white = 1.0;    ///< reading and exposure at which the curve is anchored
   double gamma_u = 0.0;  ///< of each local gamma about 1, if `prior`
 };
 

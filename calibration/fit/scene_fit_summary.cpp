@@ -74,8 +74,8 @@ void add_notes(const SceneFitProblem& problem, SceneFit& fit) {
     if (partner == i) continue;
     std::ostringstream text;
     text.precision(4);
-    text << "hardly told apart from " << fit.parameters[partner].name << " (r = "
-         << fit.correlation(static_cast<Index>(i), static_cast<Index>(partner)) << ")";
+    text << "hardly told apart from " << fit.parameters[partner].name
+         << " (r = " << fit.correlation(static_cast<Index>(i), static_cast<Index>(partner)) << ")";
     append(p.note, text.str());
   }
   if (fit.summary.outcome != Outcome::invalid_problem) note_unseen(problem, fit);
@@ -90,7 +90,8 @@ std::string SceneFit::full() const {
   if (birge > 1.0)
     text << "enlarged by      " << birge << " (chi2/nu above what chance explains)\n";
   text << "effective n      " << effective_readings << "\n";
-  if (outliers > 0) text << "outliers         " << outliers << " readings with half weight or less\n";
+  if (outliers > 0)
+    text << "outliers         " << outliers << " readings with half weight or less\n";
   text << "\n";
   for (const FittedParameter& p : parameters) {
     text << p.name << " = " << p.estimate.value;

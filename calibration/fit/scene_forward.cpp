@@ -111,12 +111,12 @@ void SceneForward::add_emissions() {
     if (choice.hold == Hold::fixed) continue;
     const std::string of = lamps.size() > 1 ? " of " + scene.materials[lamps[l]].name : "";
     const auto factor = [&](const std::string& at) {
-      const std::size_t k = add({{"emission scale" + of + at,
-                                  (choice.each_band ? "emission spectrum" : "emission scale") + of,
-                                  "emissions"},
-                                 1.0,
-                                 0.0,
-                                 kHighestFactor});
+      const std::size_t k =
+          add({{"emission scale" + of + at,
+                (choice.each_band ? "emission spectrum" : "emission scale") + of, "emissions"},
+               1.0,
+               0.0,
+               kHighestFactor});
       if (choice.hold == Hold::prior)
         priors_.push_back(
             {"prior of emission", {{k, 1.0 / choice.relative_u}}, 1.0 / choice.relative_u});
@@ -135,9 +135,11 @@ void SceneForward::add_gains() {
     const PlaneReadings& plane = problem_.planes[k];
     if (plane.gain == Hold::fixed) continue;
     const std::string name = "gain of " + plane.name;
-    gain_[k] =
-        add({{name, name, "gains"}, plane.gain_value, 0.0, kHighestFactor * plane.gain_value,
-             plane.gain_value});
+    gain_[k] = add({{name, name, "gains"},
+                    plane.gain_value,
+                    0.0,
+                    kHighestFactor * plane.gain_value,
+                    plane.gain_value});
     const double u = plane.gain_relative_u * plane.gain_value;
     if (plane.gain == Hold::prior)
       priors_.push_back({"exposure", {{*gain_[k], 1.0 / u}}, plane.gain_value / u});
@@ -210,8 +212,7 @@ bool SceneForward::predict(const Eigen::VectorXd& x, Eigen::VectorXd& readings,
   WantedDerivatives wanted;
   for (const SpectrumMap& map : spectra_) wanted.reflectance.push_back(map.basis.cols() > 0);
   for (const auto& factors : emission_) wanted.exitance = wanted.exitance || !factors.empty();
-  const BlockRadiosity b =
-      problem_.model->radiosity(state_of(x), derivatives ? &wanted : nullptr);
+  const BlockRadiosity b = problem_.model->radiosity(state_of(x), derivatives ? &wanted : nullptr);
   const auto rows = static_cast<Index>(problem_.readings());
   readings.resize(rows);
   if (derivatives) derivatives->setZero(rows, x.size());
@@ -242,14 +243,13 @@ bool SceneForward::predict(const Eigen::VectorXd& x, Eigen::VectorXd& readings,
           if (spectra_[m].basis.cols() > 0)
             d.segment(static_cast<Index>(spectra_[m].first), spectra_[m].basis.cols()) +=
                 slope * gain *
-                (b.by_reflectance[m].row(i).cwiseProduct(weights.transpose()) *
-                 spectra_[m].basis);
+                (b.by_reflectance[m].row(i).cwiseProduct(weights.transpose()) * spectra_[m].basis);
         for (std::size_t l = 0; l < emission_.size(); ++l)
           for (std::size_t band = 0; band < emission_[l].size(); ++band) {
             const auto c = static_cast<Index>(band);
-            d[static_cast<Index>(emission_[l][band])] +=
-                slope * gain * weights[c] * fixed_.exitance(static_cast<Index>(l), c) *
-                b.by_exitance[l](i, c);
+            d[static_cast<Index>(emission_[l][band])] += slope * gain * weights[c] *
+                                                         fixed_.exitance(static_cast<Index>(l), c) *
+                                                         b.by_exitance[l](i, c);
           }
         if (gain_[k]) d[static_cast<Index>(*gain_[k])] = slope * light;
       }

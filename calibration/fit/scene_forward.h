@@ -59,7 +59,7 @@ class SceneForward {
   SceneState fixed_;
   std::vector<SceneParameter> parameters_;
   std::vector<PriorRow> priors_;
-  std::vector<SpectrumMap> spectra_;               // one a material
+  std::vector<SpectrumMap> spectra_;                // one a material
   std::vector<std::vector<std::size_t>> emission_;  // lamp -> parameter of each band; none if held
   std::vector<std::optional<std::size_t>> gain_;    // plane -> parameter
   std::vector<std::size_t> gamma_;

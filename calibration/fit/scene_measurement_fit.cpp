@@ -181,8 +181,7 @@ SceneFit fit_measurement(SceneMeasurement& m, const SceneFitOptions& options,
   m.problem.region_relative_u.resize(0, 0);
   SceneFit fit = fit_scene(m.problem, how);
   if (!m.file.model_bound || fit.stopped || !m.file.interreflection ||
-      (fit.summary.outcome != Outcome::converged &&
-       fit.summary.outcome != Outcome::rank_deficient))
+      (fit.summary.outcome != Outcome::converged && fit.summary.outcome != Outcome::rank_deficient))
     return fit;
   m.problem.region_relative_u = model_uncertainty(m, fit, progress);
   return fit_scene(m.problem, how);
@@ -205,18 +204,18 @@ std::vector<FittedReading> predict_held_out(const SceneFitProblem& problem,
   for (std::size_t k = 0; k < other.planes.size(); ++k)
     for (const BlockReading& r : other.planes[k].readings) {
       const std::size_t s = problem.model->blocks()[r.block].surface;
-      const double region = problem.region_relative_u.size() > 0
-                                ? r.value * problem.region_relative_u(static_cast<Index>(s),
-                                                                      static_cast<Index>(k))
-                                : 0.0;
+      const double region =
+          problem.region_relative_u.size() > 0
+              ? r.value * problem.region_relative_u(static_cast<Index>(s), static_cast<Index>(k))
+              : 0.0;
       const double fitted = std::max(0.0, product.row(row).dot(derivatives.row(row)));
-      readings.push_back({.plane = k,
-                          .block = r.block,
-                          .value = r.value,
-                          .predicted = y[row],
-                          .standard_uncertainty = std::sqrt(
-                              r.standard_uncertainty * r.standard_uncertainty + region * region +
-                              fitted)});
+      readings.push_back(
+          {.plane = k,
+           .block = r.block,
+           .value = r.value,
+           .predicted = y[row],
+           .standard_uncertainty = std::sqrt(r.standard_uncertainty * r.standard_uncertainty +
+                                             region * region + fitted)});
       ++row;
     }
   return readings;

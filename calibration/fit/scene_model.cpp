@@ -6,6 +6,7 @@
 #include "fit/view_blocks.h"
 #include "mesh/patch_topology.h"
 #include "scene/requirements.h"
+#include "transport/direct_light.h"
 #include "transport/gather.h"
 #include "transport/sensitivity.h"
 
@@ -36,8 +37,8 @@ std::vector<std::vector<std::uint32_t>> edge_neighbours(const PatchMesh& mesh,
   std::vector<std::vector<std::uint32_t>> all(mesh.size());
   for (std::uint32_t i = 0; i < mesh.size(); ++i)
     for (std::size_t k = 0; k < mesh.patches[i].corner_count; ++k)
-      if (const auto j = topology.across(i, k); j != PatchTopology::kNone && usable[j])
-        all[i].push_back(j);
+      for (const std::uint32_t j : topology.across(i, k))
+        if (usable[j]) all[i].push_back(j);
   return all;
 }
 
@@ -58,24 +59,15 @@ SceneModel::SceneModel(const Scene& scene, const SceneModelOptions& options)
   factors_ = form_factors(mesh_, lamp_scene_, Visibility(mesh_, lamp_scene_), factor_options);
   neighbours_ = edge_neighbours(mesh_, factors_.usable);
   const Gather gather(mesh_, lamp_scene_, factor_options.occlusion);
-  Gather::Scratch scratch;
-  direct_ = BandMatrix::Zero(static_cast<Index>(mesh_.size()),
-                             static_cast<Index>(lamp_scene_.bands.size()));
-  if (lamps_.empty()) return;
-  Eigen::VectorXd sum(direct_.cols());
-  for (std::uint32_t i = 0; i < mesh_.size(); ++i) {
-    sum.setZero();
-    gather.add_mean_direct(i, sum, scratch);
-    direct_.row(static_cast<Index>(i)) = sum.transpose();
-  }
+  direct_ = mean_direct(mesh_, lamp_scene_, gather, element_tree(mesh_),
+                        ShaftCulling(mesh_, lamp_scene_, factor_options.occlusion));
 }
 
 std::size_t SceneModel::add_view(const CameraDescription& camera) {
   PixelBlockOptions how;
   how.margin_px = options_.margin_px;
   how.samples = options_.samples;
-  const PixelBlocks found =
-      pixel_blocks(lamp_scene_, mesh_, factors_.usable, Camera(camera), how);
+  const PixelBlocks found = pixel_blocks(lamp_scene_, mesh_, factors_.usable, Camera(camera), how);
   pixels_of_surface_.push_back(found.pixels_of_surface);
   const Gather gather(mesh_, lamp_scene_, requirements(lamp_scene_).occlusion);
   Gather::Scratch scratch;
@@ -137,8 +129,7 @@ std::size_t SceneModel::add_surface_means() {
       if (!factors_.usable[i] || mesh_.surface_of(mesh_.patches[i]) != s) continue;
       if (block.weights.empty()) block.element = i;
       block.weights.emplace_back(i, mesh_.patches[i].area_m2);
-      block.direct +=
-          mesh_.patches[i].area_m2 * direct_.row(static_cast<Index>(i)).transpose();
+      block.direct += mesh_.patches[i].area_m2 * direct_.row(static_cast<Index>(i)).transpose();
       area += mesh_.patches[i].area_m2;
     }
     if (scene_->surfaces[s].is_opening || area <= 0.0) continue;
@@ -160,8 +151,7 @@ std::vector<std::pair<std::uint32_t, double>> SceneModel::plane_weights(std::uin
   const Vec3 axis_u = normal.unitOrthogonal(), axis_v = normal.cross(axis_u);
   Eigen::MatrixX2d offsets(static_cast<Index>(around.size()), 2);
   for (Index k = 0; k < offsets.rows(); ++k) {
-    const Vec3 d =
-        mesh_.patches[around[static_cast<std::size_t>(k)]].centroid - patch.centroid;
+    const Vec3 d = mesh_.patches[around[static_cast<std::size_t>(k)]].centroid - patch.centroid;
     offsets.row(k) << d.dot(axis_u), d.dot(axis_v);
   }
   std::vector<std::pair<std::uint32_t, double>> weights{{element, 1.0}};
@@ -232,7 +222,7 @@ BlockRadiosity SceneModel::radiosity(const SceneState& state,
     block_rho.row(i) = state.reflectance.row(material_of(static_cast<std::size_t>(i)));
 
   answer.value = BandMatrix::Zero(n, bands);
-  BandMatrix arriving = BandMatrix::Zero(n, bands);                     // D + I of the blocks
+  BandMatrix arriving = BandMatrix::Zero(n, bands);  // D + I of the blocks
   BandMatrix direct = BandMatrix::Zero(rho.rows(), bands), indirect = direct;  // of the elements
   for (Index l = 0; l < lamps; ++l) {
     const BandMatrix unit_direct = direct_.col(l).replicate(1, bands);
@@ -270,8 +260,7 @@ BlockRadiosity SceneModel::radiosity(const SceneState& state,
       std::vector<char> is_in_material(mesh_.size());
       for (std::size_t i = 0; i < mesh_.size(); ++i)
         is_in_material[i] =
-            static_cast<Index>(
-                scene_->surfaces[mesh_.surface_of(mesh_.patches[i])].material) == m;
+            static_cast<Index>(scene_->surfaces[mesh_.surface_of(mesh_.patches[i])].material) == m;
       BandMatrix derivative;
       keep_worst(reflectance_sensitivity(system, is_in_material, options, derivative));
       const BandMatrix irradiance =

@@ -16,9 +16,9 @@ namespace truebox {
 
 /// Pixels of one camera that show the same element, and how the element's light makes their mean.
 struct ViewBlock {
-  std::size_t view = 0;       ///< which camera, in the order they were added
-  std::uint32_t element = 0;  ///< into SceneModel::mesh().patches
-  std::size_t surface = 0;    ///< into Scene::surfaces
+  std::size_t view = 0;               ///< which camera, in the order they were added
+  std::uint32_t element = 0;          ///< into SceneModel::mesh().patches
+  std::size_t surface = 0;            ///< into Scene::surfaces
   std::vector<std::uint32_t> pixels;  ///< y * width + x; empty for blocks that are no pixels'
   /// Mean irradiance straight from each luminaire at unit exitance, over the pixels; 1.
   Eigen::VectorXd direct;
@@ -54,8 +54,8 @@ struct SceneModelOptions {
   std::size_t elements = 1500;  ///< about
   double edge_m = 0.0;          ///< of the elements; above 0 it takes the place of `elements`
   FormFactorOptions form_factors;
-  int margin_px = 1;        ///< pixels left out along every edge of a surface
-  int samples = 16;         ///< points of a block at which direct light is found
+  int margin_px = 1;  ///< pixels left out along every edge of a surface
+  int samples = 16;   ///< points of a block at which direct light is found
   double solver_bound = 1e-9;
   Progress progress;
 };

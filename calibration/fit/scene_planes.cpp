@@ -15,8 +15,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kSameBand_nm = 0.5;      // channel names are rounded by their writers
-constexpr double kUsableShare = 0.75;     // of a block's pixels
+constexpr double kSameBand_nm = 0.5;   // channel names are rounded by their writers
+constexpr double kUsableShare = 0.75;  // of a block's pixels
 
 /// The image planes of one photograph as they are read, pixel by pixel.
 struct PixelPlane {
@@ -54,8 +54,7 @@ void require_size(const Image& image, const CameraDescription& camera, const std
   if (image.width == camera.pixels[0] && image.height == camera.pixels[1]) return;
   throw MismatchError(file + " has " + std::to_string(image.width) + " x " +
                       std::to_string(image.height) + " pixels, its camera " +
-                      std::to_string(camera.pixels[0]) + " x " +
-                      std::to_string(camera.pixels[1]));
+                      std::to_string(camera.pixels[0]) + " x " + std::to_string(camera.pixels[1]));
 }
 
 std::size_t band_at(const Scene& scene, double nm, const std::string& file, int line) {
@@ -90,8 +89,7 @@ std::vector<PlaneSource> spectral_planes(const Image& image, const Scene& scene,
   return planes;
 }
 
-Eigen::VectorXd weights_of(const PlaneSource& plane, const Scene& scene,
-                           const std::string& file) {
+Eigen::VectorXd weights_of(const PlaneSource& plane, const Scene& scene, const std::string& file) {
   const auto bands = static_cast<Index>(scene.bands.size());
   if (plane.band_nm)
     return Eigen::VectorXd::Unit(
@@ -141,8 +139,7 @@ BlockSum sum_pixels(const ViewBlock& block, const PixelPlane& plane, const Photo
       ++sum.saturated;
     } else {
       sum.value += value;
-      sum.variance += photo.scale * photo.scale * variance +
-                      std::pow(photo.relative_u * value, 2) +
+      sum.variance += photo.scale * photo.scale * variance + std::pow(photo.relative_u * value, 2) +
                       std::pow(photo.scale * photo.absolute_u, 2);
       ++sum.used;
     }
@@ -167,8 +164,7 @@ void add_readings(SceneMeasurement& m, const PhotographSource& photo, std::size_
       continue;
     const double n = static_cast<double>(sum.used), value = sum.value / n;
     const double own = photo.block_relative_u * value, sampling = blocks[i].sampling_u * value;
-    const double u =
-        std::sqrt((sum.variance / (n * n) + own * own + sampling * sampling) / w);
+    const double u = std::sqrt((sum.variance / (n * n) + own * own + sampling * sampling) / w);
     if (!(u > 0.0)) continue;
     const bool hold = lot(i) < m.file.held_out_share;
     (hold ? held_out : plane.readings).push_back({i, value, u});

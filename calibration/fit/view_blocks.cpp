@@ -51,11 +51,11 @@ bool is_whole(const PatchMesh& mesh, const Visibility& visibility, const Camera&
 
 }  // namespace
 
-PixelBlocks pixel_blocks(const Scene& scene, const PatchMesh& mesh,
-                         const std::vector<char>& usable, const Camera& camera,
-                         const PixelBlockOptions& options) {
+PixelBlocks pixel_blocks(const Scene& scene, const PatchMesh& mesh, const std::vector<char>& usable,
+                         const Camera& camera, const PixelBlockOptions& options) {
   const Visibility visibility(mesh, scene);
-  const SmoothField finder(mesh, usable, BandMatrix::Zero(static_cast<Eigen::Index>(mesh.size()), 1));
+  const SmoothField finder(mesh, usable,
+                           BandMatrix::Zero(static_cast<Eigen::Index>(mesh.size()), 1));
   const Seen seen = look(mesh, visibility, camera);
   const int width = camera.width_px(), height = camera.height_px();
   PixelBlocks result;
@@ -89,7 +89,8 @@ PixelBlocks pixel_blocks(const Scene& scene, const PatchMesh& mesh,
       block.centre += seen.hit[i].point / static_cast<double>(block.pixels.size());
     const std::size_t n = std::min(block.pixels.size(), static_cast<std::size_t>(options.samples));
     for (std::size_t k = 0; k < n; ++k)  // evenly through the list: rows, and columns within rows
-      block.points.push_back(seen.hit[block.pixels[(2 * k + 1) * block.pixels.size() / (2 * n)]].point);
+      block.points.push_back(
+          seen.hit[block.pixels[(2 * k + 1) * block.pixels.size() / (2 * n)]].point);
     result.blocks.push_back(std::move(block));
   }
   return result;
@@ -105,8 +106,11 @@ SampledMean mean_over_block(const PixelBlock& block, const Eigen::VectorXd& valu
   const Eigen::RowVector3d middle = positions.colwise().mean();
   positions.rowwise() -= middle;
   const Eigen::VectorXd rest = values.array() - mean;
-  const Eigen::Vector3d slope =
-      Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(positions).solve(rest);
+  // Points lie on a plane up to rounding: without a threshold that rounding would be a direction.
+  constexpr double kFlat = 1e-6;
+  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> fit;
+  fit.setThreshold(kFlat);
+  const Eigen::Vector3d slope = fit.compute(positions).solve(rest);
   const double scatter = (rest - positions * slope).norm() / std::sqrt(static_cast<double>(n - 3));
   return {mean + (block.centre.transpose() - middle).dot(slope),
           scatter / std::sqrt(static_cast<double>(n))};

@@ -31,9 +31,8 @@ struct PixelBlocks {
 /// Sorts a camera's pixels by the element that their centre sees. Left out: pixels whose corners,
 /// or whose neighbours within the margin, see another surface; backs of surfaces; elements that are
 /// not usable.
-PixelBlocks pixel_blocks(const Scene& scene, const PatchMesh& mesh,
-                         const std::vector<char>& usable, const Camera& camera,
-                         const PixelBlockOptions& options);
+PixelBlocks pixel_blocks(const Scene& scene, const PatchMesh& mesh, const std::vector<char>& usable,
+                         const Camera& camera, const PixelBlockOptions& options);
 
 /// A mean over all pixels of a block from values at its points, with its standard uncertainty.
 struct SampledMean {

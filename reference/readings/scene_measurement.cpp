@@ -92,7 +92,8 @@ PhotographSource read_photograph(TomlTable table) {
   photo.camera = table.text("camera");
   if (table.has("mask")) photo.mask_path = table.existing_file("mask");
   if (table.has("variance")) photo.variance_path = table.existing_file("variance");
-  if (table.has("standard_error")) photo.standard_error_path = table.existing_file("standard_error");
+  if (table.has("standard_error"))
+    photo.standard_error_path = table.existing_file("standard_error");
   photo.gain_value = table.number_or("gain", 1.0, 1e-12, kLargest);
   photo.gain.fit = one_of(table, "gain_fit", "free", {"fixed", "free", "prior"});
   if (photo.gain.fit == "prior")
@@ -107,9 +108,8 @@ PhotographSource read_photograph(TomlTable table) {
     for (TomlTable& plane : table.tables("planes"))
       photo.planes.push_back(read_plane(std::move(plane)));
     has_variances = has_variances ||
-                    std::all_of(photo.planes.begin(), photo.planes.end(), [](const auto& plane) {
-                      return !plane.variance_channel.empty();
-                    });
+                    std::all_of(photo.planes.begin(), photo.planes.end(),
+                                [](const auto& plane) { return !plane.variance_channel.empty(); });
   }
   if (!(photo.relative_u + photo.absolute_u + photo.block_relative_u > 0.0) && !has_variances)
     table.fail("relative_u",
@@ -121,8 +121,8 @@ PhotographSource read_photograph(TomlTable table) {
 }
 
 void read_model(TomlTable table, SceneMeasurementFile& m) {
-  m.elements = static_cast<std::size_t>(table.has("elements") ? table.integer("elements", 6, 30000)
-                                                              : 1500);
+  m.elements =
+      static_cast<std::size_t>(table.has("elements") ? table.integer("elements", 6, 30000) : 1500);
   if (table.has("bands_nm")) m.bands_nm = table.integers("bands_nm", 1, 1000000);
   m.margin_px = table.has("margin_px") ? table.integer("margin_px", 0, 100) : 1;
   m.interreflection = read_flag(table, "interreflection", true);
@@ -160,7 +160,8 @@ SceneMeasurementFile read_scene_measurement(const std::filesystem::path& path) {
   }
   if (root.has("emissions")) {
     TomlTable all = root.table("emissions");
-    for (const std::string& name : all.keys()) m.emissions.emplace(name, read_lamp(all.table(name)));
+    for (const std::string& name : all.keys())
+      m.emissions.emplace(name, read_lamp(all.table(name)));
   }
   if (root.has("response")) {
     TomlTable table = root.table("response");

@@ -38,10 +38,10 @@ struct LampChoice : UnknownChoice {
 /// One plane of a photograph: a linear reading of a band, or of all bands through a responsivity.
 struct PlaneSource {
   std::string name;
-  std::string channel;              ///< of the image file
-  std::string variance_channel;     ///< of the same file, or empty
-  std::optional<double> band_nm;    ///< a band of the scene
-  std::string responsivity_path;    ///< or a table: wavelength in nm, then curves
+  std::string channel;            ///< of the image file
+  std::string variance_channel;   ///< of the same file, or empty
+  std::optional<double> band_nm;  ///< a band of the scene
+  std::string responsivity_path;  ///< or a table: wavelength in nm, then curves
   std::string responsivity_column;
   int line = 0;
 };
@@ -51,10 +51,10 @@ struct PhotographSource {
   std::string path, camera, mask_path;
   std::string variance_path, standard_error_path;  ///< of each pixel, channels named alike
   std::vector<PlaneSource> planes;  ///< empty: one for each band of the scene, by channel name
-  UnknownChoice gain;      ///< one a plane; u relative: the exposure's
-  double gain_value = 1.0;  ///< reading per radiance (W m^-2 sr^-1 nm^-1)
-  double scale = 1.0;       ///< readings are multiplied by it
-  double saturation = 0.0;  ///< readings at or above it are not used; 0: none is
+  UnknownChoice gain;               ///< one a plane; u relative: the exposure's
+  double gain_value = 1.0;          ///< reading per radiance (W m^-2 sr^-1 nm^-1)
+  double scale = 1.0;               ///< readings are multiplied by it
+  double saturation = 0.0;          ///< readings at or above it are not used; 0: none is
   double relative_u = 0.0, absolute_u = 0.0;  ///< of a pixel, independent; beside any variance
   double block_relative_u = 0.0;  ///< of the mean of an element's pixels: texture, what the model
                                   ///< misses there; not averaged away
@@ -84,9 +84,9 @@ struct SceneMeasurementFile {
   std::size_t elements = 1500;
   int margin_px = 1;
   bool interreflection = true;
-  bool model_bound = true;       ///< the prediction's error bound enters the covariance
+  bool model_bound = true;  ///< the prediction's error bound enters the covariance
   double robust_sigma = 0.0;
-  double held_out_share = 0.0;   ///< of the readings, predicted and not fitted
+  double held_out_share = 0.0;  ///< of the readings, predicted and not fitted
 };
 
 /// Whether the file measures a scene (key `photographs`), not a chart.

@@ -66,8 +66,7 @@ inline SceneFitProblem cube_problem(const SceneModel& model, double relative_noi
     PlaneReadings plane;
     plane.name = "band " + std::to_string(b + 1);
     plane.band_weights = Eigen::VectorXd::Unit(bands, b);
-    for (std::size_t i = 0; i < model.blocks().size(); ++i)
-      plane.readings.push_back({i, 0.0, 1.0});
+    for (std::size_t i = 0; i < model.blocks().size(); ++i) plane.readings.push_back({i, 0.0, 1.0});
     problem.planes.push_back(std::move(plane));
   }
   const std::vector<double> exact = predicted_readings(problem);

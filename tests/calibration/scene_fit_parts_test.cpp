@@ -27,8 +27,9 @@ TEST(Whiten, TurnsTheJointCovarianceIntoUnity) {
   Eigen::MatrixXd w = Eigen::MatrixXd::Identity(5, 5);
   whiten(sigma, regions, w);
   // Rounding: a few operations on numbers near 1.
-  EXPECT_LT((w * covariance * w.transpose() - Eigen::MatrixXd::Identity(5, 5)).cwiseAbs().maxCoeff(),
-            1e-13);
+  EXPECT_LT(
+      (w * covariance * w.transpose() - Eigen::MatrixXd::Identity(5, 5)).cwiseAbs().maxCoeff(),
+      1e-13);
 }
 
 TEST(ResponseCurve, WithUnitGammasIsLinear) {
@@ -71,8 +72,8 @@ TEST(ResponseCurve, IsBlackWithoutLight) {
 
 TEST(SpectralBasis, KeepsSpectraBetweenTheirCoefficients) {
   const auto bands = WavelengthGrid::uniform(400, 700, 10);
-  for (const auto basis :
-       {SpectralBasis::bands, SpectralBasis::constant, SpectralBasis::linear, SpectralBasis::bspline}) {
+  for (const auto basis : {SpectralBasis::bands, SpectralBasis::constant, SpectralBasis::linear,
+                           SpectralBasis::bspline}) {
     const Eigen::MatrixXd m = spectral_basis(basis, 6, bands);
     EXPECT_GE(m.minCoeff(), 0.0);
     EXPECT_LT((m.rowwise().sum().array() - 1.0).abs().maxCoeff(), 1e-14);
@@ -169,6 +170,17 @@ TEST(MeanOverBlock, IsExactForAPlaneOfLight) {
   const SampledMean mean = mean_over_block(block, light);
   EXPECT_NEAR(mean.value, 3.0 + 1.4 - 0.2, 1e-13);
   EXPECT_LT(mean.standard_uncertainty, 1e-13);
+}
+
+TEST(MeanOverBlock, DoesNotTakeRoundingForADirection) {
+  PixelBlock block;
+  Eigen::VectorXd light(9);
+  for (int k = 0; k < 9; ++k) {  // a wall at x = 5.56 whose points are off by a rounding
+    block.points.emplace_back(5.56 + (k % 2 ? 1e-15 : -1e-15), 0.1 * (k % 3), 0.1 * (k / 3));
+    light[k] = 1.0 + 0.1 * std::sin(7.0 * k);
+  }
+  block.centre = Vec3(5.56 + 3e-15, 0.1, 0.1);
+  EXPECT_NEAR(mean_over_block(block, light).value, light.mean(), 0.01);
 }
 
 TEST(MeanOverBlock, IsUncertainAcrossAShadowEdge) {

@@ -18,7 +18,8 @@ std::array<double, 6> albedos_of(const std::string& scene) {
 }
 
 TEST(SceneFitUncertainty, IsTheCramerRaoBoundInEveryRow) {
-  const TableFile table = read_table(std::string(TRUEBOX_REFERENCE_DIR) + "/analytic/albedo_crlb.csv");
+  const TableFile table =
+      read_table(std::string(TRUEBOX_REFERENCE_DIR) + "/analytic/albedo_crlb.csv");
   ASSERT_EQ(table.rows.size(), 12u);
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
     const std::string& scene_name = table.rows[row][0];
