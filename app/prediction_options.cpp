@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
@@ -160,6 +161,41 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
   return predicted;
 }
 
+namespace {
+
+// The exponent p of cost ~ n^p by least squares over the three grids.
+double fitted_exponent(const Prediction& prediction, double (*cost)(const LinkSummary&)) {
+  double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
+  for (const GridSolution* grid :
+       {&prediction.fine(), &prediction.coarse(), &prediction.coarsest()}) {
+    const double u = std::log(static_cast<double>(grid->mesh.size()));
+    const double v = std::log(std::max(1e-9, cost(*grid->links)));
+    n += 1.0, x += u, y += v, xx += u * u, xy += u * v;
+  }
+  return (n * xy - x * y) / (n * xx - x * x);
+}
+
+std::string describe_links(const Prediction& prediction) {
+  const LinkSummary& links = *prediction.fine().links;
+  return fmt::format(
+             "  links: {} between {} elements ({:.1f} an element), {} groups hidden, {} rays; "
+             "{:.0f} "
+             "MiB; they leave out {:.1e} rms (estimated)\n",
+             links.links, links.elements,
+             static_cast<double>(links.links) / static_cast<double>(links.elements), links.hidden,
+             prediction.fine().form_factors.rays, static_cast<double>(links.bytes) / (1 << 20),
+             links.relative_error) +
+         fmt::format(
+             "  cost over the three grids: links ~ n^{:.2f}, processor time ~ n^{:.2f} ({:.3g} s "
+             "here)\n",
+             fitted_exponent(prediction,
+                             [](const LinkSummary& l) { return static_cast<double>(l.links); }),
+             fitted_exponent(prediction, [](const LinkSummary& l) { return l.processor_s; }),
+             links.processor_s);
+}
+
+}  // namespace
+
 std::string describe(const Predicted& p) {
   const GridSolution& grid = p.prediction->fine();
   const FormFactorSummary& f = grid.form_factors;
@@ -173,14 +209,7 @@ std::string describe(const Predicted& p) {
         fmt::format("  adapted in {} steps from {} to {} elements, then each cut in four\n",
                     p.adapt_steps.size(), p.adapt_steps.front().cells, p.adapt_steps.back().cells);
   if (grid.links)
-    text += fmt::format(
-        "  links: {} between {} elements ({:.1f} an element), {} groups hidden, {} rays; {:.0f} "
-        "MiB; "
-        "they leave out {:.1e} rms (estimated)\n",
-        grid.links->links, grid.links->elements,
-        static_cast<double>(grid.links->links) / static_cast<double>(grid.links->elements),
-        grid.links->hidden, f.rays, static_cast<double>(grid.links->bytes) / (1 << 20),
-        grid.links->relative_error);
+    text += describe_links(*p.prediction);
   else
     text += fmt::format("  form factors: {} pairs without anything between, {} hidden, {} {}\n",
                         f.pairs_unoccluded, f.pairs_hidden, f.pairs_sampled,

@@ -38,6 +38,22 @@ Observer observer() {
 
 std::vector<double> values(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
 
+// One entry a grid, the finest first: what a fit of cost against size needs.
+nlohmann::json links_json(const Prediction& prediction) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const GridSolution* grid :
+       {&prediction.fine(), &prediction.coarse(), &prediction.coarsest()})
+    if (grid->links)
+      json.push_back({{"elements", grid->links->elements},
+                      {"links", grid->links->links},
+                      {"pairs_tried", grid->links->tried},
+                      {"bytes", grid->links->bytes},
+                      {"processor_s", grid->links->processor_s},
+                      {"relative_tolerance", grid->links->relative_tolerance},
+                      {"relative_error_estimate", grid->links->relative_error}});
+  return json;
+}
+
 nlohmann::json summary_json(const Predicted& p) {
   const GridSolution& grid = p.prediction->fine();
   const FormFactorSummary& f = grid.form_factors;
@@ -70,6 +86,7 @@ nlohmann::json summary_json(const Predicted& p) {
             {"closure_error_mean", f.closure_error_mean},
             {"repair_max", f.repair_max},
             {"closure_residual_max", f.closure_residual_max}}},
+          {"links", links_json(*p.prediction)},
           {"solver",
            {{"outcome", grid.solve.brief()},
             {"iterations", grid.solve.iterations},
@@ -108,6 +125,8 @@ nlohmann::json solution_json(const Predicted& p) {
   return json;
 }
 
+constexpr std::size_t kSurfacesShown = 100;
+
 void print_surfaces(const Predicted& p) {
   const std::size_t bands = p.scene.bands.size();
   const std::vector<std::size_t> shown =
@@ -120,7 +139,12 @@ void print_surfaces(const Predicted& p) {
         p.scene.is_total ? "all wavelengths" : fmt::format("{:.0f} nm", p.scene.bands.centre_nm(b)),
         "bound");
   fmt::print("   ({})\n", p.scene.exitance_unit());
+  std::size_t printed = 0;
   for (const SurfaceMean& mean : surface_means(*p.prediction)) {
+    if (++printed > kSurfacesShown) {
+      fmt::print("... {} surfaces in all; -o FILE.json has the others\n", p.scene.surfaces.size());
+      break;
+    }
     fmt::print("{:<20}", mean.surface);
     for (std::size_t b : shown) {
       const auto k = static_cast<Eigen::Index>(b);

@@ -16,11 +16,12 @@ namespace {
 using Eigen::Index;
 
 // Errors of links fall like the root of the error allowed to each (measured on three rooms).
-constexpr double kFirstShare = 4.0;   // the first links are about this much coarser
-constexpr double kFinestStep = 1e-3;  // of the error of a link, from the first links to the second
+constexpr int kRounds = 4;
+constexpr double kLargestStep = 1.0 / 16, kSmallestStep = 1.0 / 3;  // of a link's error, each round
 constexpr double kLinksOfAnElement = 40.0;                    // at a tolerance of 1e-2, in rooms
 constexpr std::size_t kBytesOfAnElement = 2600;               // tree, points of groups, kernels
 constexpr std::size_t kBytesOfALink = sizeof(Link) * 2 + 16;  // while two lists and halves are held
+constexpr double kAccurateBelow = 4e-3;
 constexpr double kLeastRow = 0.1;  // rows that hold less than this are not scaled up to 1
 
 double processor_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -42,29 +43,27 @@ class Finder {
     const ElementTree tree = usable_tree();
     const LinkRefinement refinement(request_.mesh, request_.visibility, tree, request_.culling,
                                     request_.options.seed);
-    // First links: light as if spread evenly.
+    // First links: light as if spread evenly. Each round knows the light that the last one found.
     const double tolerance = options_.relative_tolerance;
-    double of_a_link = std::pow(kFirstShare * tolerance, 2) / kFirstShare;
-    const BandMatrix guess = ambient_guess();
-    Links links = refine(refinement, tree, guess, of_a_link);
-    const double first_estimate = std::sqrt(links.sum_of_squares);
-    BandMatrix first_irradiance = BandMatrix::Zero(guess.rows(), guess.cols());
-    LinkedExchange first_exchange(tree, area_, links.links);
+    double of_a_link = tolerance * tolerance;
+    BandMatrix radiosity = ambient_guess(), irradiance, last;
+    double worth = 1.0, last_estimate = 0.0;
+    Links links;
     test_enclosure();
-    close(first_exchange);
-    const BandMatrix first = solved(first_exchange, first_irradiance);
-    // Second links: they know the light.
-    double worth = 1.0;
-    if (first_estimate > 0.0)
-      of_a_link *= std::clamp(std::pow(tolerance / first_estimate, 2), kFinestStep, 1.0);
-    links = refine(refinement, tree, first, of_a_link);
-    auto exchange = std::make_unique<LinkedExchange>(tree, area_, links.links);
-    close(*exchange);
-    found_.exchange = std::move(exchange);
-    if (first_estimate > 0.0) {
-      BandMatrix irradiance;
-      solved(*found_.exchange, irradiance);
-      worth = std::max(1.0, relative_difference(first_irradiance, irradiance) / first_estimate);
+    for (int round = 0; round < kRounds; ++round) {
+      links = refine(refinement, tree, radiosity, of_a_link);
+      auto exchange = std::make_unique<LinkedExchange>(tree, area_, links.links);
+      close(*exchange);
+      radiosity = solved(*exchange, irradiance);
+      found_.exchange = std::move(exchange);
+      const double estimate = std::sqrt(links.sum_of_squares);
+      if (last_estimate > 0.0) worth = relative_difference(last, irradiance) / last_estimate;
+      worth = std::max(1.0, worth);
+      if (round > 0 && worth * estimate <= tolerance) break;
+      last = irradiance;
+      last_estimate = estimate;
+      const double step = estimate > 0.0 ? std::pow(tolerance / (worth * estimate), 2) : 1.0;
+      of_a_link *= std::clamp(step, kLargestStep, kSmallestStep);
     }
     FormFactorSummary& summary = found_.summary;
     summary.rays = links.rays;
@@ -108,6 +107,7 @@ class Finder {
     LinkOptions options;
     options.error_of_a_link = of_a_link;
     options.rays = request_.options.rays;
+    options.accurate_elements = options_.relative_tolerance < kAccurateBelow;
     options.seed = request_.options.seed;
     options.progress = request_.options.progress;
     const std::size_t others = request_.mesh.size() * kBytesOfAnElement;

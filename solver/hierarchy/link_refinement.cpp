@@ -169,6 +169,18 @@ class LinkRefinement::Walk {
     return {share, std::max(std::sqrt(share * (1.0 - share)), 0.5 / (cast + 1))};
   }
 
+  // From the points of an element to a whole other one.
+  double mean_factor(std::uint32_t from, const PlanarPolygon& to) const {
+    const GroupSamples& samples = parent_.samples_[from];
+    double factor = 0.0;
+    for (int k = 0; k < kGroupSamples; ++k) {
+      const Vec3 point = samples.point(node(from), k);
+      if (to.plane.distance_m(point) > 0.0)
+        factor += samples.weight[k] * point_to_polygon(point, node(from).normal, to.vertices);
+    }
+    return factor;
+  }
+
   void link_elements(Pair pair, bool may_be_hidden) {
     const std::uint32_t i = parent_.tree_.order[node(pair.a).begin];
     const std::uint32_t j = parent_.tree_.order[node(pair.b).begin];
@@ -178,8 +190,22 @@ class LinkRefinement::Walk {
       if (visible.share == 0.0) return;
       ++found.sampled;
     }
-    const double exchange_m2 = visible.share * parent_.kernel_.exchange_area_m2(i, j);
-    if (exchange_m2 > 0.0) add(pair, exchange_m2 / (node(pair.a).area_m2 * node(pair.b).area_m2));
+    // Near ones by Lambert's formula from points of the smaller; from a gap on, points alone.
+    const ElementNode &a = node(pair.a), &b = node(pair.b);
+    const bool is_near = gap_m(a, b) < kFarEnough * std::max(a.radius_m, b.radius_m);
+    double kernel_per_m2 = 0.0;
+    if (!is_near)
+      kernel_per_m2 =
+          kernel_statistics(parent_.samples_[pair.a], parent_.samples_[pair.b], b.centre - a.centre)
+              .mean;
+    else if (options_.accurate_elements)
+      kernel_per_m2 =
+          exchange_area_m2(parent_.polygons_[i], parent_.polygons_[j], kElementTolerance) /
+          (a.area_m2 * b.area_m2);
+    else
+      kernel_per_m2 = a.area_m2 < b.area_m2 ? mean_factor(pair.a, parent_.polygons_[j]) / b.area_m2
+                                            : mean_factor(pair.b, parent_.polygons_[i]) / a.area_m2;
+    if (kernel_per_m2 > 0.0) add(pair, visible.share * kernel_per_m2);
   }
 
   // What one side gets wrong, relative to the mean irradiance, times the root of its area share.
@@ -242,8 +268,7 @@ LinkRefinement::LinkRefinement(const PatchMesh& mesh, const Visibility& visibili
       tree_(tree),
       culling_(culling),
       samples_(group_samples(mesh, tree, seed)),
-      polygons_(polygons_of(mesh)),
-      kernel_(polygons_, kElementTolerance) {}
+      polygons_(polygons_of(mesh)) {}
 
 Links LinkRefinement::refine(const NodeLight& light, const LinkOptions& options) const {
   // Breadth first until there is work for all threads.

@@ -76,6 +76,10 @@ class Builder {
       return;
     }
     const auto corners = mesh_.corners_of(patch(node.begin));
+    if (node.end - node.begin == 1 && corners.size() <= node.corners.size()) {
+      for (std::uint32_t v : corners) node.corners[node.corner_count++] = mesh_.vertices[v];
+      return;
+    }
     const Vec3 u = (mesh_.vertices[corners[1]] - mesh_.vertices[corners[0]]).normalized();
     const Vec3 v = node.normal.cross(u);
     Eigen::AlignedBox2d in_plane;

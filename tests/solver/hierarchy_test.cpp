@@ -80,6 +80,7 @@ Links refined(const Room& room, double of_a_link) {
     area[i] = room.mesh.patches[static_cast<std::size_t>(i)].area_m2;
   LinkOptions options;
   options.error_of_a_link = of_a_link;
+  options.accurate_elements = true;
   return refinement.refine(node_light(tree, area, room.source, VectorXd::Ones(1)), options);
 }
 
