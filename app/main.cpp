@@ -48,9 +48,9 @@ int main(int argc, char** argv) {
   Action chosen;
   for (auto* add :
        {&add_demo_command, &add_plan_command, &add_solve_command, &add_probe_command,
-        &add_render_command, &add_calibrate_command, &add_chart_command, &add_fit_command, &add_compare_command,
-        &add_suite_command, &add_accept_command, &add_report_command, &add_validate_command,
-        &add_viewfactor_command, &add_sweep_command, &add_export_command})
+        &add_render_command, &add_calibrate_command, &add_chart_command, &add_fit_command,
+        &add_compare_command, &add_suite_command, &add_accept_command, &add_report_command,
+        &add_validate_command, &add_viewfactor_command, &add_sweep_command, &add_export_command})
     (*add)(program, chosen);
   try {
     program.parse(argc, argv);
