@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "fit/chart_blocks.h"
+#include "radiometry/input_error.h"
 
 namespace truebox {
 namespace {
@@ -223,6 +224,9 @@ void fit_band(const BandContext& context, const BandFiles& files, BandMeasuremen
 }  // namespace
 
 ChartMeasurement measure_chart(const MeasurementFile& file, const Progress& progress) {
+  if (!file.has_chart())
+    throw InputError(file.path, 0, "[chart] and [known], which a fit of reflectances needs",
+                     "none");
   ChartMeasurement measurement;
   measurement.file = file;
   measurement.chart =

@@ -13,6 +13,7 @@ namespace truebox {
 namespace {
 
 constexpr std::size_t kReadings = 256, kMiddle = 128, kUnitReadings = 16;
+constexpr double kUnknown = 0.3;       // relative standard uncertainty
 constexpr double kLevel = 1.0 + 1e-4;  // above the ties that make_rising parts
 constexpr int kSide = 10;              // 100 pixels: Debevec's system has 256 + 100 unknowns
 constexpr int kSquareSide = 64;        // Robertson averages over all pixels given
@@ -227,10 +228,13 @@ ResponseCurve recover_response(const std::vector<Frame>& frames, ResponseMethod 
   while (result.highest > kMiddle && held[result.highest] == 0) --result.highest;
   result.largest_repair = make_rising(mean);
   normalise(mean);
-  // Readings at the ends that all stand for one signal tell nothing apart.
+  // Readings at the ends that all stand for one signal, or whose signal is hardly known, are out.
+  const auto unknown = [&](std::size_t r) { return std::sqrt(variance[r]) > kUnknown * mean[r]; };
   const auto level = [&](std::size_t r) { return mean[r + 1] < mean[r] * kLevel; };
-  while (result.lowest < kMiddle && level(result.lowest)) ++result.lowest;
-  while (result.highest > kMiddle && level(result.highest - 1)) --result.highest;
+  while (result.lowest < kMiddle && (unknown(result.lowest) || level(result.lowest)))
+    ++result.lowest;
+  while (result.highest > kMiddle && (unknown(result.highest) || level(result.highest - 1)))
+    --result.highest;
   for (std::size_t r = 0; r < kReadings; ++r)
     result.signal_dn.push_back({mean[r], r >= result.lowest && r <= result.highest
                                              ? std::sqrt(variance[r])

@@ -20,7 +20,7 @@ struct ResponseCurve {
   std::string why_not;
   std::vector<Estimate> signal_dn;        ///< 256, rising; u: pixel sets and frames, see below
   double largest_repair = 0.0;            ///< relative change that making the curve rise took
-  std::size_t lowest = 0, highest = 255;  ///< readings held and told apart; beyond, u is infinite
+  std::size_t lowest = 0, highest = 255;  ///< known to 30 % and told apart; beyond, u is infinite
 };
 
 /// Recovers the curve from frames of one still scene (8 bit, at least two exposures), made rising

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -56,16 +57,19 @@ TEST_P(Recovery, FindsThePowerLawWithinItsUncertainty) {
   ASSERT_TRUE(curve.found) << curve.why_not;
   ASSERT_EQ(curve.signal_dn.size(), 256u);
   double z2 = 0.0, n = 0.0, mean_relative_u = 0.0;
-  for (std::size_t r = 20; r <= 235; ++r) {
+  EXPECT_LE(curve.lowest, 40u);
+  EXPECT_GE(curve.highest, 200u);
+  for (std::size_t r = std::max<std::size_t>(curve.lowest, 20);
+       r <= std::min<std::size_t>(curve.highest, 235); ++r) {
     const auto& [value, u] = curve.signal_dn[r];
     const double width = 0.5 * (true_signal(r + 0.5) - true_signal(r - 0.5));
     EXPECT_NEAR(value, true_signal(r), 4.0 * u + width) << r;
-    mean_relative_u += u / value / 216.0;
+    mean_relative_u += u / value;
     z2 += std::pow((value - true_signal(r)) / std::hypot(u, width), 2);
     n += 1.0;
   }
   EXPECT_LT(z2 / n, 2.0);  // readings are correlated: no sharper than this
-  EXPECT_LT(mean_relative_u, GetParam() == ResponseMethod::debevec ? 0.03 : 0.2);
+  EXPECT_LT(mean_relative_u / n, GetParam() == ResponseMethod::debevec ? 0.03 : 0.2);
 }
 
 TEST_P(Recovery, Rises) {
@@ -128,10 +132,12 @@ TEST_P(Recovery, AgreesBetweenTwoHalvesOfARealSeries) {
   double z2 = 0.0, n = 0.0;
   for (std::size_t r = 30; r <= 230; r += 10) {
     const auto &a = even.signal_dn[r], &b = odd.signal_dn[r];
+    if (!std::isfinite(a.standard_uncertainty + b.standard_uncertainty)) continue;
     z2 += std::pow(a.value - b.value, 2) /
           (std::pow(a.standard_uncertainty, 2) + std::pow(b.standard_uncertainty, 2));
     n += 1.0;
   }
+  ASSERT_GE(n, 10.0);
   EXPECT_LT(z2 / n, 4.0);  // the readings move together: two sigma of one number
 }
 
