@@ -66,6 +66,25 @@ double share_within(const std::vector<EdgeMatch>& matches, double limit_px) {
   return matches.empty() ? 0.0 : within / static_cast<double>(matches.size());
 }
 
+/// How a camera contradicts the guess: three times further off than a guess may be. Pictures full
+/// of lines have some that fit, seen from elsewhere.
+std::string contradiction(const CameraParameters& guess, const CameraParameters& found) {
+  constexpr double kRadians = 0.52, kRelative = 0.35;  // 30 degrees; 10 % three times, and a little
+  const auto percent = [](double ratio) {
+    return std::to_string(static_cast<int>(std::lround(100.0 * (ratio - 1.0)))) + " %";
+  };
+  const auto distance = [](const CameraParameters& p) {
+    return std::hypot(p.pose[3], p.pose[4], p.pose[5]);
+  };
+  const double nearer = distance(found) / distance(guess);
+  const double longer = found.intrinsics[0] / guess.intrinsics[0];
+  const double angle = std::hypot(found.pose[0], found.pose[1], found.pose[2]);
+  if (std::abs(nearer - 1.0) > kRelative) return "is off in distance by " + percent(nearer);
+  if (std::abs(longer - 1.0) > kRelative) return "is off in focal length by " + percent(longer);
+  if (angle > kRadians) return "is turned by over 30 degrees";
+  return {};
+}
+
 }  // namespace
 
 std::string to_string(EdgeUse use) {
@@ -225,10 +244,14 @@ bool BoxAligner::judge(BoxAlignment& result) const {
   result.matched_share = share_within(judged, limit);
   std::size_t found = 0;
   for (const auto& [edge, matches] : by_edge) found += share_within(matches, limit) >= 0.5;
-  const std::size_t needed = std::max(kLeastEdges, by_edge.size() / 2);
-  if (result.matched_share >= kLeastShare && found >= needed) return true;
+  const std::size_t needed = std::max(kLeastEdges, (2 * by_edge.size() + 2) / 3);
   if (options_.points.size() >= 4) return true;  // a person says that it is this box
   result.outcome = AlignmentOutcome::no_such_box;
+  if (const std::string far = contradiction(guess_, result.parameters); !far.empty()) {
+    result.message = "the photograph does not show this box near the guess: the best camera " + far;
+    return false;
+  }
+  if (result.matched_share >= kLeastShare && found >= needed) return true;
   result.message = "the photograph does not show this box: " + std::to_string(judged.size()) +
                    " pieces of edge were predicted at the best position, " +
                    std::to_string(static_cast<int>(100.0 * result.matched_share)) +

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// clang-format off: jpeglib.h needs FILE and does not include it
+// jpeglib.h needs FILE and does not include it.
+// clang-format off
 #include <cstdio>
 #include <jpeglib.h>
 // clang-format on

@@ -225,6 +225,21 @@ INSTANTIATE_TEST_SUITE_P(
               [](int x, int y, std::mt19937_64&) { return x + y / 3 > 300 ? 0.9f : 0.1f; }}),
     [](const auto& other) { return std::string(other.param.name); });
 
+// Real photographs with many straight lines, none of them this box's.
+TEST(AlignBox, RefusesPhotographsOfChessboards) {
+  for (const char* name : {"left01.jpg", "left12.jpg"}) {
+    const Image photo =
+        read_image(std::string(TRUEBOX_REFERENCE_DIR) + "/chessboard_opencv/" + name);
+    Image cut(576, 480);
+    auto& samples = cut.add_channel("Y").samples;
+    for (int y = 0; y < 480; ++y)
+      for (int x = 0; x < 576; ++x)
+        samples[cut.index(x, y)] = photo.channels[0].samples[photo.index(x + 32, y)];
+    const BoxAlignment found = align_box(test_box(), test_camera(), cut, {});
+    EXPECT_EQ(found.outcome, AlignmentOutcome::no_such_box) << name << " " << found.matched_share;
+  }
+}
+
 TEST(AlignBox, SaysSoWhereTheGuessSeesNoEdge) {
   CameraDescription away = test_camera();
   away.direction = -away.direction;  // the box is behind the camera
