@@ -39,6 +39,8 @@ nlohmann::json as_json(const ClosedBox& c) {
   return {{"elements", c.elements},
           {"threads", c.threads},
           {"form_factors", name_of(c.method)},
+          {"link_tolerance", c.link_tolerance},
+          {"links", c.links},
           {"job_s", c.job_s},
           {"job_cpu_s", c.job_cpu_s},
           {"cells_s", c.cells_s},
@@ -152,10 +154,13 @@ int main(int argc, char** argv) {
   std::vector<std::size_t> elements{500, 1000, 2000, 4000};
   std::vector<std::size_t> closed_elements{300, 600, 1200, 2400};
   bool only_closed_box = false;
+  std::vector<double> link_tolerances{4e-2, 1e-2};
   std::size_t kernel_elements = 2000;
   std::string json_path, reference = TRUEBOX_REFERENCE_DIR;
   program.add_option("--elements", elements, "sizes of the fine grid")->delimiter(',');
   program.add_option("--closed-box-elements", closed_elements, "sizes for the closed box")
+      ->delimiter(',');
+  program.add_option("--link-tolerances", link_tolerances, "of hierarchical form factors")
       ->delimiter(',');
   program.add_flag("--only-closed-box", only_closed_box, "nothing but the closed box");
   program.add_option("--kernel-elements", kernel_elements, "size of the matrix for the kernels")
@@ -200,7 +205,7 @@ int main(int argc, char** argv) {
       "{:>9}{:>9}{:>10}{:>10}{:>10}{:>12}{:>12}{:>12}{:>11}\n",
       "elements", "threads", "hidden by", "job / s", "CPU / s", "rms error", "its floor",
       "mean bound", "covered");
-  for (int threads : {1, 2})
+  for (int threads : only_closed_box ? std::vector<int>{1} : std::vector<int>{1, 2})
     for (const auto method : {FormFactorMethod::ray_casting, FormFactorMethod::exact_visibility})
       for (std::size_t count : closed_elements) {
         const ClosedBox box = measure_closed_box(reference, count, threads, method);
@@ -208,6 +213,18 @@ int main(int argc, char** argv) {
         std::fflush(stdout);
         json["closed_box"].push_back(as_json(box));
       }
+  fmt::print(
+      "\nThe same by links between groups, one thread\n{:>9}{:>12}{:>12}{:>10}{:>12}{:>12}\n",
+      "elements", "tolerance", "links", "CPU / s", "rms error", "mean bound");
+  for (double tolerance : link_tolerances)
+    for (std::size_t count : closed_elements) {
+      const ClosedBox box =
+          measure_closed_box(reference, count, 1, FormFactorMethod::ray_casting, tolerance);
+      fmt::print("{:>9}{:>12.3g}{:>12}{:>10.3f}{:>12.3f}{:>12.3f}\n", box.elements, tolerance,
+                 box.links, box.job_cpu_s, 100.0 * box.rms_error, 100.0 * box.mean_bound);
+      std::fflush(stdout);
+      json["closed_box_hierarchical"].push_back(as_json(box));
+    }
   if (only_closed_box) return 0;
   const Kernels kernels = measure_kernels(scene, kernel_elements);
   print(kernels);

@@ -48,6 +48,8 @@ Accuracy measure_accuracy(const Scene& scene, const std::filesystem::path& refer
 struct ClosedBox {
   std::size_t elements = 0;
   FormFactorMethod method = FormFactorMethod::ray_casting;
+  double link_tolerance = 0.0;  ///< of hierarchical form factors; 0: the full matrix
+  std::size_t links = 0;        ///< of the fine grid
   int threads = 1;
   double job_s = 0.0;
   double job_cpu_s = 0.0;  ///< processor time, all threads: what a busy machine does not change
@@ -58,7 +60,7 @@ struct ClosedBox {
   double covered = 0.0;  ///< share of errors within bound + 3 standard errors
 };
 ClosedBox measure_closed_box(const std::filesystem::path& reference_dir, std::size_t elements,
-                             int threads, FormFactorMethod method);
+                             int threads, FormFactorMethod method, double link_tolerance = 0.0);
 
 /// What the machine does, and what the program makes of it.
 struct Kernels {

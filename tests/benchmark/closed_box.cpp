@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "benchmark.h"
+#include "hierarchy/hierarchical_exchange.h"
 #include "radiometry/table_file.h"
 #include "scene/scene_file.h"
 #include "transport/prediction.h"
@@ -50,7 +51,7 @@ double cpu_s() {
 }  // namespace
 
 ClosedBox measure_closed_box(const std::filesystem::path& reference_dir, std::size_t elements,
-                             int threads, FormFactorMethod method) {
+                             int threads, FormFactorMethod method, double link_tolerance) {
   const auto folder = reference_dir / "independent_renders";
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(threads));
@@ -65,6 +66,11 @@ ClosedBox measure_closed_box(const std::filesystem::path& reference_dir, std::si
   PredictOptions options;
   options.elements = elements;
   options.form_factors.method = method;
+  if (link_tolerance > 0.0) {
+    HierarchyOptions hierarchy;
+    hierarchy.relative_tolerance = link_tolerance;
+    options.find_exchange = hierarchical_exchange(hierarchy);
+  }
   const double solve_s =
       seconds([&] { prediction = std::make_unique<Prediction>(scene, options); });
   const auto bands = static_cast<Eigen::Index>(scene.bands.size());
@@ -81,6 +87,8 @@ ClosedBox measure_closed_box(const std::filesystem::path& reference_dir, std::si
     }
   });
   result.elements = prediction->fine().mesh.size();
+  if (const auto& links = prediction->fine().links) result.links = links->links;
+  result.link_tolerance = link_tolerance;
   result.job_s = read_s + solve_s + cells_s;
   result.job_cpu_s = cpu_s() - cpu_before_s;
   result.cells_s = cells_s;
