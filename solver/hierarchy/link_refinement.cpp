@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kFarEnough = 0.5;  // gap over radius from which 16 x 16 points see the kernel
 constexpr double kElementTolerance = 1e-4;
-constexpr std::size_t kTasks = 4096;
+constexpr std::size_t kTasks = 256;  // each starts from all blockers again
 constexpr int kFirstRays = 8;
 
 double gap_m(const ElementNode& a, const ElementNode& b) { return a.box.exteriorDistance(b.box); }
