@@ -14,6 +14,8 @@
 
 #include "scene/scene_file.h"
 
+using truebox::FormFactorMethod;
+
 namespace {
 
 using namespace truebox::benchmark;
