@@ -237,7 +237,11 @@ std::string describe(const Predicted& p) {
                         100.0 * step.relative_bound);
   if (p.misses_target)
     text += "  the target error is not reached: finer grids do not fit the memory limit\n";
-  if (!p.prediction->bound_is_reliable())
+  if (grid.links)
+    text +=
+        "  error bound: an estimate only, with three times what the links are thought to leave "
+        "out\n";
+  else if (!p.prediction->bound_is_reliable())
     text += fmt::format(
         "  error bound: an estimate only, the grid is too coarse ({} elements a surface; {} "
         "wanted)\n",

@@ -147,13 +147,19 @@ void DistributedRows::repair() {
   const Index local = partition_.local(), begin = partition_.begin();
   const VectorXd missing = area_m2_.segment(begin, local) - row_sums();
   VectorXd open = VectorXd::Zero(local);
-  const auto usable = [&](Index k) { return usable_[static_cast<std::size_t>(begin + k)] != 0; };
+  const auto whole = [&](Index k) {
+    return usable_[static_cast<std::size_t>(begin + k)] != 0 &&
+           std::abs(missing[k]) <= kPartlyBuriedRow * area_m2_[begin + k];
+  };
+  std::vector<char> is_whole(static_cast<std::size_t>(local));
+  for (Index k = 0; k < local; ++k) is_whole[static_cast<std::size_t>(k)] = whole(k);
   double before = 0.0, weighted = 0.0, total = 0.0;
   std::vector<char> mended(static_cast<std::size_t>(local));
   for (Index k = 0; k < local; ++k) {
     for (std::uint32_t j : partial_[static_cast<std::size_t>(k)]) open[k] += rows_(k, j);
-    mended[static_cast<std::size_t>(k)] = usable(k) && open[k] >= kLeastShare * area_m2_[begin + k];
-    if (!usable(k)) continue;
+    mended[static_cast<std::size_t>(k)] =
+        is_whole[static_cast<std::size_t>(k)] && open[k] >= kLeastShare * area_m2_[begin + k];
+    if (!is_whole[static_cast<std::size_t>(k)]) continue;
     const double error = std::abs(missing[k]) / area_m2_[begin + k];
     before = std::max(before, error);
     weighted += area_m2_[begin + k] * error * error;
@@ -187,7 +193,8 @@ void DistributedRows::repair() {
       largest = std::max(largest, std::abs(by - 1.0));
       rows_(k, j) *= by;
     }
-    if (usable(k)) after = std::max(after, std::abs(rows_.row(k).sum() / area_m2_[begin + k] - 1));
+    if (is_whole[static_cast<std::size_t>(k)])
+      after = std::max(after, std::abs(rows_.row(k).sum() / area_m2_[begin + k] - 1));
   }
   summary_.repair_max = partition_.max(largest);
   summary_.closure_residual_max = partition_.max(after);

@@ -31,6 +31,9 @@ std::vector<char> usable_patches(const PatchMesh& mesh, const Scene& scene,
 inline constexpr double kEmptyRow = 1e-4;
 /// The same where rows are exact: at a block's outline what lies under it sees slivers.
 inline constexpr double kNearlyEmptyRow = 0.1;
+/// Exact rows of a closed scene that miss 1 by more than this lie partly under another surface:
+/// what is missing there is not an error of the factors.
+inline constexpr double kPartlyBuriedRow = 0.1;
 
 /// Cosine-distributed rays, 16 from every usable element: the scene is closed if none escapes.
 struct ClosureTest {

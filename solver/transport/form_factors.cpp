@@ -327,9 +327,13 @@ FormFactors without_rays(const PatchMesh& mesh, const Scene& scene, const Visibi
   summary.closed = closure.closed;
   summary.closure_rays = closure.rays;
   if (summary.closed) {
-    const ClosureReport report =
-        repair_closure(result.exchange_area_m2, result.area_m2, result.usable, exact.partial,
-                       ClosureRepair::scaling);
+    std::vector<char> whole = result.usable;
+    for (Eigen::Index i = 0; i < result.size(); ++i)
+      if (std::abs(result.exchange_area_m2.col(i).sum() / result.area_m2[i] - 1.0) >
+          kPartlyBuriedRow)
+        whole[static_cast<std::size_t>(i)] = 0;
+    const ClosureReport report = repair_closure(result.exchange_area_m2, result.area_m2, whole,
+                                                exact.partial, ClosureRepair::scaling);
     summary.closure_error_max = report.error_before_max;
     summary.closure_error_mean = report.error_before_rms;
     summary.repair_max = report.change_max;

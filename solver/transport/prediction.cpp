@@ -178,6 +178,7 @@ Eigen::VectorXd Prediction::expand(const Eigen::VectorXd& distinct) const {
 }
 
 bool Prediction::bound_is_reliable() const {
+  if (fine().links) return false;  // what they leave out is an estimate
   return !needs_.interreflection ||
          static_cast<double>(fine().mesh.size()) >=
              kPatchesAPiece * static_cast<double>(fine().mesh.pieces.size());

@@ -111,6 +111,7 @@ class Prediction {
   std::vector<BandMatrix> radiosity_by_reflectance() const;
   /// Whether the grids are fine enough for the bound to mean what it says: on average
   /// kPatchesAPiece elements a piece or more. Below, it was seen to miss up to 10 % of test points.
+  /// Never with links: three times their estimate is in the bound, which is an estimate then.
   bool bound_is_reliable() const;
   static constexpr double kPatchesAPiece = 40.0;
 

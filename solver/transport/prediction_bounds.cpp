@@ -43,10 +43,26 @@ Eigen::VectorXd pointwise_factor(const Scene& scene) {
 
 }  // namespace
 
-// A solver's bound holds for every element, so for any mean of them.
+// A solver's bound holds for every element, so for any mean of them. What links leave out is an
+// estimate, root mean square; against full matrices it was up to 1.5 times too small.
 Eigen::VectorXd Prediction::solver_bounds() const {
+  constexpr double kLinksAtMost = 3.0;
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(fine().indirect.cols());
-  for (const auto& level : levels_) sum += level->solution.solve.error_bound;
+  for (const auto& level : levels_) {
+    const GridSolution& grid = level->solution;
+    sum += grid.solve.error_bound;
+    if (!grid.links) continue;
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(sum.size());
+    double area_m2 = 0.0;
+    for (std::size_t i = 0; i < grid.mesh.size(); ++i) {
+      if (!grid.usable[i]) continue;
+      const auto row = static_cast<Index>(i);
+      mean += grid.mesh.patches[i].area_m2 *
+              (grid.direct.row(row) + grid.indirect.row(row)).transpose();
+      area_m2 += grid.mesh.patches[i].area_m2;
+    }
+    if (area_m2 > 0.0) sum += kLinksAtMost * grid.links->relative_error / area_m2 * mean;
+  }
   return sum;
 }
 
