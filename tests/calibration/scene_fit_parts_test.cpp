@@ -210,7 +210,7 @@ TEST(SurfaceMeans, AreThoseOfAFurnace) {
 TEST(SurfaceMeans, WeighUnequalElementsByTheirAreas) {
   // Direct light alone, rho = 1/2: the mean irradiance of the floor is its view factor to the
   // ceiling, that of opposite faces of a cube (Hottel 1930). The floor is one surface of two
-  // unequal triangles and a rest, so that its elements differ in size.
+  // trapezoids, so that its elements differ in size.
   Scene scene = lit_cube({{.5, .5, .5, .5, .5, .5}});
   for (Surface& s : scene.surfaces)
     if (s.name.starts_with("ceiling")) s.material = 6;
