@@ -249,7 +249,7 @@ TEST_F(SpectroradiometerBox, ASheetAsBackWallAgainstTheSameOutside) {
       for (const double x : v) text += std::to_string(x) + " ";
       RecordProperty(r.name + "_" + what, text);
     };
-    // The fitted reflectances' E_n is the same: difference and u shrink alike, by how much the
+    // To first order the fitted E_n is the same: difference and u shrink alike, by how much the
     // effect itself follows the reflectance.
     const auto largest_en = [&](const VectorXd& d) {
       return (d.array().abs() / (2.0 * r.u.array())).maxCoeff();
