@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "calibration/scene_fit_cases.h"
 #include "fit/identifiability.h"
 #include "fit/joint_whitening.h"
 #include "fit/response_curve.h"
@@ -192,6 +193,57 @@ TEST(MeanOverBlock, IsUncertainAcrossAShadowEdge) {
   }
   block.centre = Vec3(1.5, 1.5, 0.0);
   EXPECT_GT(mean_over_block(block, light).standard_uncertainty, 0.04);
+}
+
+TEST(SurfaceMeans, AreThoseOfAFurnace) {
+  // Every wall emits M and reflects rho: B = M / (1 - rho) everywhere.
+  const Scene scene = tiny::cube(2.0, 0.6, 3.0);
+  SceneModelOptions options = cube_grid(0.5);
+  SceneModel model(scene, options);
+  EXPECT_EQ(model.add_surface_means(), 0u);
+  ASSERT_EQ(model.blocks().size(), 6u);
+  const BlockRadiosity all = model.radiosity(model.state(), nullptr);
+  // Form factors: quadrature between walls that share an edge.
+  for (Eigen::Index i = 0; i < all.value.rows(); ++i) EXPECT_NEAR(all.value(i, 0), 7.5, 7.5e-4);
+}
+
+TEST(SurfaceMeans, WeighUnequalElementsByTheirAreas) {
+  // Direct light alone, rho = 1/2: the mean irradiance of the floor is its view factor to the
+  // ceiling, that of opposite faces of a cube (Hottel 1930). The floor is one surface of two
+  // trapezoids, so that its elements differ in size.
+  Scene scene = lit_cube({{.5, .5, .5, .5, .5, .5}});
+  for (Surface& s : scene.surfaces)
+    if (s.name.starts_with("ceiling")) s.material = 6;
+  Surface& floor = scene.surfaces[4];
+  floor.pieces = {{{0, 0, 0}, {.3, 0, 0}, {.1, 1, 0}, {0, 1, 0}},
+                  {{.3, 0, 0}, {1, 0, 0}, {1, 1, 0}, {.1, 1, 0}}};
+  SceneModel model(scene, cube_grid(0.25));
+  model.add_surface_means();
+  SceneState state = model.state();
+  state.interreflection = false;
+  const BlockRadiosity all = model.radiosity(state, nullptr);
+  const double root = std::sqrt(2.0);
+  const double view_factor =
+      2.0 / M_PI *
+      (0.5 * std::log(4.0 / 3.0) + 2.0 * root * std::atan(1.0 / root) - 2.0 * std::atan(1.0));
+  double area = 0.0, weights = 0.0;
+  for (const auto& [element, weight] : model.blocks()[4].weights) {
+    EXPECT_NEAR(weight, model.mesh().patches[element].area_m2, 1e-14);  // of a floor of 1 m^2
+    area += model.mesh().patches[element].area_m2;
+    weights += weight;
+  }
+  EXPECT_NEAR(area, 1.0, 1e-14);
+  EXPECT_NEAR(weights, 1.0, 1e-14);
+  // The mean over an element is a quadrature of a smooth function.
+  EXPECT_NEAR(all.value(4, 0), 0.5 * view_factor, 1e-5);
+}
+
+TEST(SurfaceMeans, LeaveOutOpenings) {
+  Scene scene = tiny::cube(1.0, 0.5, 1.0);
+  scene.surfaces.back().is_opening = true;
+  SceneModel model(scene, cube_grid(0.5));
+  model.add_surface_means();
+  EXPECT_EQ(model.blocks().size(), 5u);
 }
 
 }  // namespace
