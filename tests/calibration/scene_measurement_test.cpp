@@ -98,6 +98,7 @@ const Image& picture() {
 }
 
 SceneMeasurement measured(const std::string& text = kMeasurement, const Image& photo = picture()) {
+  written("fit_scene.toml", kScene);
   write_exr(scratch_path("fit_photo.exr"), photo);
   return read_scene_fit(read_scene_measurement(written("fit.toml", text)));
 }
