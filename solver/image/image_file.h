@@ -11,9 +11,9 @@
 namespace truebox {
 
 /// Reads EXR (half, float or integer), PNG (8 or 16 bit), TIFF (8 or 16 bit, float), JPEG (grey or
-/// RGB, upright as its Exif says) or Radiance pictures (EXPOSURE divided out), by content. RAW files
-/// of cameras (DNG by content, others by their ending) give the photosites of the visible area as
-/// they were read, not demosaiced, not scaled, black level not subtracted: one channel "Y",
+/// RGB, upright as its Exif says) or Radiance pictures (EXPOSURE divided out), by content. RAW
+/// files of cameras (DNG by content, others by their ending) give the photosites of the visible
+/// area as they were read, not demosaiced, not scaled, black level not subtracted: one channel "Y",
 /// attributes "bayer", "white_level_dn", where the file states them "black_level_dn" (one for all
 /// photosites) and "exposure_s". Integer samples keep their digital numbers (DN), nothing is
 /// linearised or scaled, NaN and Inf stay; palette PNGs keep their indices.

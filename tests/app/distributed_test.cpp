@@ -2,6 +2,7 @@
 // The same solve on several ranks of MPI. Skipped where there is no mpirun or no PETSc.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -39,7 +40,7 @@ class Distributed : public testing::Test {
   }
 };
 
-constexpr char kSettings[] = " --elements 800 --solver-bound 1e-9 ";
+constexpr char kSettings[] = " --elements 400 --solver-bound 1e-9 ";
 
 // Both solves are within 1e-9 of the same system's solution; its factors differ by the order in
 // which closure is summed, 1e-12.
@@ -64,7 +65,9 @@ TEST_F(Distributed, AnyNumberOfRanksGivesTheSerialAnswer) {
         for (std::size_t b = 0; b < found["band_centres_nm"].size(); ++b) {
           const double value = found["surfaces"][s][quantity][b];
           const double wanted = expected["surfaces"][s][quantity][b];
-          EXPECT_NEAR(value, wanted, 1e-8 * std::abs(wanted) + 1e-12)
+          // A bound holds the solver's own, which depends on where it stopped.
+          const double size = found["surfaces"][s]["radiosity"][b];
+          EXPECT_NEAR(value, wanted, 1e-8 * std::max(std::abs(wanted), size) + 1e-12)
               << ranks << " ranks, " << found["surfaces"][s]["name"] << ", " << quantity;
         }
     for (const char* count : {"pairs_unoccluded", "pairs_hidden", "pairs_sampled"})

@@ -108,8 +108,9 @@ quantum_efficiency = { R = 0.3, G = 0.4, B = 0.2 }
 }
 
 TEST_F(Program, EveryCommandHasHelpWithAnExample) {
-  for (const char* command : {"", "demo", "plan", "solve", "probe", "render", "calibrate", "chart", "fit",
-                              "compare", "suite", "accept", "report", "validate", "export"}) {
+  for (const char* command :
+       {"", "demo", "plan", "solve", "probe", "render", "calibrate", "chart", "fit", "compare",
+        "suite", "accept", "report", "validate", "export"}) {
     const Outcome help = run(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0) << command;
     EXPECT_THAT(help.text, HasSubstr("Example")) << command;
@@ -411,8 +412,11 @@ TEST_F(Program, RadiosityRefusesAMirrorAndPathsTraceIt) {
     EXPECT_THAT(refused.text, HasSubstr("--method path"));
   }
   EXPECT_FALSE(fs::exists(file("x.exr")));
-  for (const std::string to : {"mitsuba", "pbrt", "radiance", "obj", "gltf"})
-    EXPECT_EQ(run("export " + scene + " --to " + to + " -o " + file(to)).code, 4) << to;
+  for (const std::string to : {"mitsuba", "radiance", "obj", "gltf"})
+    EXPECT_EQ(run("export " + scene + " --to " + to + " -o " + file(to)).code, 0) << to;
+  const Outcome refused = run("export " + scene + " --to pbrt -o " + file("pbrt"));
+  EXPECT_EQ(refused.code, 4);
+  EXPECT_THAT(refused.text, HasSubstr("material \"white\": a reflectance"));
   EXPECT_EQ(run("render " + scene + " --method path --samples 16 -o " + file("x.exr")).code, 0);
 }
 
