@@ -229,9 +229,9 @@ std::string describe(const Predicted& p) {
           : fmt::format("  the scene is open (no repair); largest row sum {:.6f}\n", f.row_sum_max);
   text += "  radiosity: " + grid.solve.brief() + "\n";
   if (const auto& shares = p.prediction->error_shares())
-    text += fmt::format(
-        "  mean error bound: grids {:.2g} %, form factors {:.1g} %, solver {:.1g} %\n",
-        100.0 * shares->discretisation, 100.0 * shares->form_factors, 100.0 * shares->solver);
+    text += fmt::format("  mean error bound: grids {:.2g} %, form factors {:.1g} %, {} {:.1g} %\n",
+                        100.0 * shares->discretisation, 100.0 * shares->form_factors,
+                        grid.links ? "links and solver" : "solver", 100.0 * shares->solver);
   for (const TargetStep& step : p.target_steps)
     text += fmt::format("  {} elements: means of surfaces bound to {:.3g} %\n", step.elements,
                         100.0 * step.relative_bound);

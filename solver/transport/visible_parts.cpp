@@ -27,7 +27,8 @@ void VisibleParts::remove_shadow(const Vec3& point, const Blocker& blocker) {
   const double side = blocker.plane.distance_m(point) > 0.0 ? 1.0 : -1.0;
   const std::size_t n = blocker.polygon.size();
   for (Polygon& part : parts_) {
-    current_.swap(part);
+    const std::size_t before = rest_.size();
+    current_ = part;
     for (std::size_t i = 0; i < n && !current_.empty(); ++i) {
       const Vec3 a = blocker.polygon[i] - point, b = blocker.polygon[(i + 1) % n] - point;
       const Vec3 outward = side * a.cross(b);
@@ -40,9 +41,17 @@ void VisibleParts::remove_shadow(const Vec3& point, const Blocker& blocker) {
       clip(current_, Plane{-edge.normal, -edge.offset_m}, tolerance, inside_);
       current_.swap(inside_);
     }
-    if (current_.empty()) continue;
     const Plane near{side * blocker.plane.normal, side * blocker.plane.offset_m};
-    clip(current_, near, kTolerance * (current_[0] - point).norm(), outside_);
+    const double tolerance = current_.empty() ? 0.0 : kTolerance * (current_[0] - point).norm();
+    const bool is_hidden = std::any_of(current_.begin(), current_.end(), [&](const Vec3& v) {
+      return near.distance_m(v) < -tolerance;
+    });
+    if (!is_hidden) {  // whole again: cuts that hide nothing would multiply with every blocker
+      rest_.resize(before);
+      rest_.push_back(std::move(part));
+      continue;
+    }
+    clip(current_, near, tolerance, outside_);
     if (!outside_.empty()) rest_.push_back(outside_);
   }
   parts_.swap(rest_);
