@@ -256,8 +256,8 @@ Report calibration_report(const PhotometricCalibration& calibration) {
     }
   report.verdict.sentence =
       tested ? fmt::format(
-                   "{} linear photographs; on frames that no fit used, the variance differs "
-                   "from the prediction by {:.1f} % at most",
+                   "{} linear photographs; on frames that no fit used, the mean variance of each "
+                   "colour differs from the prediction by {:.1f} % at most",
                    calibration.photographs.size(), 100.0 * worst)
              : fmt::format("{} linear photographs; too few frames to test their noise",
                            calibration.photographs.size());
