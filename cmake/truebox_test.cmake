@@ -5,6 +5,8 @@ function(truebox_test name)
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} truebox_warnings GTest::gmock_main)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  # What takes time is in the libraries; optimising the tests themselves costs a fifth of their build.
+  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   target_compile_definitions(${name} PRIVATE
     TRUEBOX_REFERENCE_DIR="${PROJECT_SOURCE_DIR}/reference" TRUEBOX_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     TRUEBOX_PROGRAM="$<TARGET_FILE:truebox_program>")

@@ -39,6 +39,15 @@ void Partition::gather(const double* part, VectorXd& whole) const {
                  first_.data(), MPI_DOUBLE, comm_);
 }
 
+void Partition::gather(const double* part, Index columns, BandMatrix& whole) const {
+  whole.resize(rows_, columns);
+  std::vector<int> count = count_, first = first_;
+  for (int& c : count) c *= static_cast<int>(columns);
+  for (int& f : first) f *= static_cast<int>(columns);
+  MPI_Allgatherv(part, static_cast<int>(local() * columns), MPI_DOUBLE, whole.data(), count.data(),
+                 first.data(), MPI_DOUBLE, comm_);
+}
+
 void Partition::gather(const std::vector<char>& part, std::vector<char>& whole) const {
   whole.resize(static_cast<std::size_t>(rows_));
   MPI_Allgatherv(part.data(), static_cast<int>(local()), MPI_CHAR, whole.data(), count_.data(),

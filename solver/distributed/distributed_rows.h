@@ -24,6 +24,7 @@ class Partition {
 
   /// Puts every rank's part of a vector together, on every rank.
   void gather(const double* part, Eigen::VectorXd& whole) const;
+  void gather(const double* part, Eigen::Index columns, BandMatrix& whole) const;
   void gather(const std::vector<char>& part, std::vector<char>& whole) const;
   double sum(double value) const;
   double max(double value) const;

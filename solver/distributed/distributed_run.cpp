@@ -24,32 +24,38 @@ void check(PetscErrorCode code) {
   throw std::runtime_error(std::string("PETSc: ") + (text ? text : "an unknown error"));
 }
 
-// diag(A / rho) B - S B = diag(A / rho) M, symmetric and positive definite as q < 1. Where rho = 0
-// nothing is reflected: the row is that of the identity, the column empty.
-struct BandSystem {
+// diag(A / rho) B - S B = diag(A / rho) M for every band, symmetric and positive definite as q < 1;
+// one system, so that ranks wait for each other once a step and not once a step and band. Where
+// rho = 0 nothing is reflected: the row is that of the identity, the column empty.
+struct BandSystems {
   const Partition& partition;
   const DistributedRows& rows;
-  VectorXd diagonal;         // of the local rows, m^2
-  std::vector<char> active;  // of all n
-  mutable VectorXd whole;
+  BandMatrix diagonal;  // of the local rows, m^2
+  BandMatrix active;    // of all n: 1, or 0 where rho = 0
+  mutable BandMatrix whole;
   mutable int products = 0;
 
-  void apply(const double* x, double* y) const {
-    partition.gather(x, whole);
-    for (Index j = 0; j < whole.size(); ++j)
-      if (!active[static_cast<std::size_t>(j)]) whole[j] = 0.0;
-    Eigen::Map<VectorXd> result(y, partition.local());
-    result.noalias() = rows.exchange_area_m2() * whole;
-    for (Index k = 0; k < result.size(); ++k)
-      result[k] = active[static_cast<std::size_t>(partition.begin() + k)]
-                      ? diagonal[k] * x[k] - result[k]
-                      : x[k];
+  Index bands() const { return diagonal.cols(); }
+
+  // S x of the local rows, x given on them; nothing comes from where rho = 0 if `masked`.
+  BandMatrix exchange(const double* x, bool masked) const {
+    partition.gather(x, bands(), whole);
+    if (masked) whole = whole.cwiseProduct(active);
     ++products;
+    return rows.exchange_area_m2() * whole;
+  }
+
+  void apply(const double* x, double* y) const {
+    const Eigen::Map<const BandMatrix> from(x, partition.local(), bands());
+    Eigen::Map<BandMatrix> to(y, partition.local(), bands());
+    const auto own = active.middleRows(partition.begin(), partition.local());
+    const BandMatrix received = exchange(x, true);
+    to = diagonal.cwiseProduct(from) - own.cwiseProduct(received);
   }
 };
 
 PetscErrorCode multiply(Mat matrix, Vec in, Vec out) {
-  BandSystem* system = nullptr;
+  BandSystems* system = nullptr;
   PetscCall(MatShellGetContext(matrix, &system));
   const PetscScalar* x = nullptr;
   PetscScalar* y = nullptr;
@@ -62,7 +68,7 @@ PetscErrorCode multiply(Mat matrix, Vec in, Vec out) {
 }
 
 PetscErrorCode copy_diagonal(Mat matrix, Vec out) {
-  BandSystem* system = nullptr;
+  BandSystems* system = nullptr;
   PetscCall(MatShellGetContext(matrix, &system));
   PetscScalar* y = nullptr;
   PetscCall(VecGetArrayWrite(out, &y));
@@ -74,9 +80,9 @@ PetscErrorCode copy_diagonal(Mat matrix, Vec out) {
 // PETSc's objects of one system, released together.
 class Krylov {
  public:
-  explicit Krylov(BandSystem& system) {
-    const auto local = static_cast<PetscInt>(system.partition.local());
-    const auto all = static_cast<PetscInt>(system.partition.rows());
+  explicit Krylov(BandSystems& system) {
+    const auto local = static_cast<PetscInt>(system.partition.local() * system.bands());
+    const auto all = static_cast<PetscInt>(system.partition.rows() * system.bands());
     check(MatCreateShell(system.partition.comm(), local, local, all, all, &system, &matrix_));
     check(MatShellSetOperation(matrix_, MATOP_MULT, reinterpret_cast<void (*)()>(multiply)));
     check(MatShellSetOperation(matrix_, MATOP_GET_DIAGONAL,
@@ -102,7 +108,7 @@ class Krylov {
   Krylov& operator=(const Krylov&) = delete;
 
   // Improves `x`; returns false if PETSc did not get there.
-  bool solve(const VectorXd& right_hand_side, double relative, int limit, VectorXd& x,
+  bool solve(const BandMatrix& right_hand_side, double relative, int limit, BandMatrix& x,
              int& iterations) {
     copy(right_hand_side, b_);
     copy(x, x_);
@@ -121,7 +127,7 @@ class Krylov {
   }
 
  private:
-  static void copy(const VectorXd& from, Vec to) {
+  static void copy(const BandMatrix& from, Vec to) {
     PetscScalar* values = nullptr;
     check(VecGetArrayWrite(to, &values));
     std::copy_n(from.data(), from.size(), values);
@@ -133,49 +139,52 @@ class Krylov {
   KSP solver_ = nullptr;
 };
 
-// One band. The bound is a posteriori, as in solve_radiosity.
-void solve_band(const Partition& partition, const DistributedRows& rows, const BandMatrix& rho,
-                const BandMatrix& source, Index band, const SolveOptions& options,
-                GridSolution& grid) {
-  const Index begin = partition.begin(), local = partition.local();
-  BandSystem system{partition, rows, VectorXd::Ones(local), {}, {}, 0};
-  system.active.resize(static_cast<std::size_t>(partition.rows()));
-  for (Index j = 0; j < partition.rows(); ++j)
-    system.active[static_cast<std::size_t>(j)] = rho(j, band) > 0.0;
-  VectorXd right(local), b(local);
-  for (Index k = 0; k < local; ++k) {
-    const Index i = begin + k;
-    if (rho(i, band) > 0.0) system.diagonal[k] = rows.area_m2()[i] / rho(i, band);
-    right[k] = system.diagonal[k] * source(i, band);
-    b[k] = source(i, band);
-  }
-  const double q = rho.col(band).maxCoeff() * rows.summary().row_sum_max;
-  if (!(q < 1.0)) throw std::invalid_argument("reflectances must stay below 1: energy grows");
+// All bands, each scaled to a source of 1 at most, so that none is lost beside brighter ones. The
+// bound of each is a posteriori, as in solve_radiosity.
+void solve_bands(const Partition& partition, const DistributedRows& rows, const BandMatrix& rho,
+                 const BandMatrix& source, const SolveOptions& options, GridSolution& grid) {
+  const Index begin = partition.begin(), local = partition.local(), bands = rho.cols();
+  BandSystems system{partition, rows, BandMatrix::Ones(local, bands), {}, {}, 0};
+  system.active = (rho.array() > 0.0).cast<double>();
+  const VectorXd area = rows.area_m2().segment(begin, local);
+  const BandMatrix own_rho = rho.middleRows(begin, local);
+  for (Index k = 0; k < local; ++k)
+    for (Index b = 0; b < bands; ++b)
+      if (own_rho(k, b) > 0.0) system.diagonal(k, b) = area[k] / own_rho(k, b);
+  Eigen::RowVectorXd scale = source.cwiseAbs().colwise().maxCoeff();
+  scale = (scale.array() > 0.0).select(scale, 1.0);
+  const BandMatrix own = source.middleRows(begin, local).array().rowwise() / scale.array();
+  const BandMatrix right = system.diagonal.cwiseProduct(own);
+  const Eigen::RowVectorXd q = rho.colwise().maxCoeff() * rows.summary().row_sum_max;
+  if (!(q.maxCoeff() < 1.0))
+    throw std::invalid_argument("reflectances must stay below 1: energy grows");
+
   Krylov krylov(system);
-  VectorXd irradiance(local), whole;
-  double relative = 0.1 * options.relative_bound * (1.0 - q), bound = 0.0;
+  BandMatrix x = own, irradiance, whole;
+  Eigen::RowVectorXd bound(bands);
+  double relative = 0.1 * options.relative_bound * (1.0 - q.maxCoeff());
   bool is_done = false;
   for (int attempt = 0; attempt < 6 && !is_done; ++attempt, relative *= 0.01) {
     const bool converged = krylov.solve(right, std::max(relative, 1e-15), options.iteration_limit,
-                                        b, grid.solve.iterations);
-    partition.gather(b.data(), whole);
-    irradiance.noalias() = rows.exchange_area_m2() * whole;
-    double residual = 0.0;
-    for (Index k = 0; k < local; ++k) {
-      irradiance[k] /= rows.area_m2()[begin + k];
-      residual = std::max(residual, std::abs(source(begin + k, band) +
-                                             rho(begin + k, band) * irradiance[k] - b[k]));
-    }
-    bound = partition.max(residual) / (1.0 - q);
-    is_done = bound <= options.relative_bound * whole.cwiseAbs().maxCoeff();
+                                        x, grid.solve.iterations);
+    irradiance = system.exchange(x.data(), false);
+    irradiance = irradiance.array().colwise() / area.array();
+    const BandMatrix residual = own + own_rho.cwiseProduct(irradiance) - x;
+    for (Index b = 0; b < bands; ++b)
+      bound[b] =
+          partition.max(local > 0 ? residual.col(b).cwiseAbs().maxCoeff() : 0.0) / (1.0 - q[b]);
+    partition.gather(x.data(), bands, whole);
+    const Eigen::RowVectorXd wanted =
+        options.relative_bound * whole.cwiseAbs().colwise().maxCoeff();
+    is_done = (bound.array() <= wanted.array()).all();
     if (!converged) break;
   }
-  grid.solve.error_bound[band] = bound;
-  grid.solve.matrix_passes += system.products;
   if (!is_done) grid.solve.outcome = SolveOutcome::iteration_limit;
-  grid.reflected.col(band) = whole;
-  partition.gather(irradiance.data(), whole);
-  grid.indirect.col(band) = whole;
+  grid.solve.matrix_passes = system.products;
+  grid.solve.error_bound = bound.cwiseProduct(scale).transpose();
+  grid.reflected = whole.array().rowwise() * scale.array();
+  partition.gather(irradiance.data(), bands, whole);
+  grid.indirect = whole.array().rowwise() * scale.array();
 }
 
 }  // namespace
@@ -216,12 +225,7 @@ SolveGrid DistributedRun::solve_grid() {
     grid.form_factors = rows.summary();
     grid.solve = {};
     grid.solve.outcome = SolveOutcome::converged;
-    grid.solve.error_bound.resize(rho.cols());
-    grid.reflected.resize(rho.rows(), rho.cols());
-    grid.indirect.resize(rho.rows(), rho.cols());
-    for (Index band = 0; band < rho.cols(); ++band)
-      solve_band(partition, rows, rho, task.source, band, task.solve, grid);
-    grid.solve.matrix_passes /= static_cast<double>(rho.cols());
+    solve_bands(partition, rows, rho, task.source, task.solve, grid);
     state->times.form_factors_s += partition.max(solve_start_s - start_s);
     state->times.solve_s += partition.max(MPI_Wtime() - solve_start_s);
     state->times.rows_bytes = std::max(

@@ -2,7 +2,6 @@
 // The same solve on several ranks of MPI. Skipped where there is no mpirun or no PETSc.
 #include <gmock/gmock.h>
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -23,7 +22,7 @@ const std::string kProgram = "'" TRUEBOX_PROGRAM "'";
 // More ranks than cores, and as root in a container: both must be asked for.
 const std::string kMpirun =
     "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 "
-    "OMPI_MCA_rmaps_base_oversubscribe=1 timeout 120 mpirun -n ";
+    "OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_mpi_yield_when_idle=1 timeout 120 mpirun -n ";
 
 nlohmann::json json_of(const fs::path& path) {
   std::ifstream file(path);
@@ -40,9 +39,9 @@ class Distributed : public testing::Test {
   }
 };
 
-constexpr char kSettings[] = " --elements 400 --solver-bound 1e-9 ";
+constexpr char kSettings[] = " --elements 300 --solver-bound 1e-11 ";
 
-// Both solves are within 1e-9 of the same system's solution; its factors differ by the order in
+// Both solves are within 1e-11 of the same system's solution; its factors differ by the order in
 // which closure is summed, 1e-12.
 TEST_F(Distributed, AnyNumberOfRanksGivesTheSerialAnswer) {
   const fs::path serial_file = scratch_path("serial.json");
@@ -65,9 +64,10 @@ TEST_F(Distributed, AnyNumberOfRanksGivesTheSerialAnswer) {
         for (std::size_t b = 0; b < found["band_centres_nm"].size(); ++b) {
           const double value = found["surfaces"][s][quantity][b];
           const double wanted = expected["surfaces"][s][quantity][b];
-          // A bound holds the solver's own, which depends on where it stopped.
-          const double size = found["surfaces"][s]["radiosity"][b];
-          EXPECT_NEAR(value, wanted, 1e-8 * std::max(std::abs(wanted), size) + 1e-12)
+          // A bound holds the solver's own, 1e-11 of the largest radiosity and 1e-7 of the bound,
+          // which depends on where it stopped.
+          const double relative = quantity == std::string("radiosity_error_bound") ? 1e-4 : 1e-8;
+          EXPECT_NEAR(value, wanted, relative * std::abs(wanted) + 1e-12)
               << ranks << " ranks, " << found["surfaces"][s]["name"] << ", " << quantity;
         }
     for (const char* count : {"pairs_unoccluded", "pairs_hidden", "pairs_sampled"})
