@@ -156,12 +156,11 @@ void DistributedRows::repair() {
   const Index local = partition_.local(), begin = partition_.begin();
   const VectorXd missing = area_m2_.segment(begin, local) - row_sums();
   VectorXd open = VectorXd::Zero(local);
-  const auto whole = [&](Index k) {
-    return usable_[static_cast<std::size_t>(begin + k)] != 0 &&
-           std::abs(missing[k]) <= kPartlyBuriedRow * area_m2_[begin + k];
-  };
   std::vector<char> is_whole(static_cast<std::size_t>(local));
-  for (Index k = 0; k < local; ++k) is_whole[static_cast<std::size_t>(k)] = whole(k);
+  for (Index k = 0; k < local; ++k)
+    is_whole[static_cast<std::size_t>(k)] =
+        usable_[static_cast<std::size_t>(begin + k)] &&
+        std::abs(missing[k]) <= kPartlyBuriedRow * area_m2_[begin + k];
   double before = 0.0, weighted = 0.0, total = 0.0;
   std::vector<char> mended(static_cast<std::size_t>(local));
   for (Index k = 0; k < local; ++k) {

@@ -18,7 +18,9 @@ struct DistributedTimes {
 /// One process of a solve that is spread over the ranks of MPI; there may be one in a process. The
 /// rows of the form factors stay where they were found, vectors of n numbers travel. Krylov methods
 /// are PETSc's, on a shell matrix: conjugate gradients with Jacobi's preconditioner unless its own
-/// options say otherwise.
+/// options say otherwise. In every band, n x bands, W m^-2 nm^-1, scaled to sources of 1:
+///   diag(A / rho) B - S B = diag(A / rho) M,
+/// with the a-posteriori bound of solve_radiosity. Source: Balay et al. (1997), PETSc.
 class DistributedRun {
  public:
   /// Starts MPI and PETSc. `petsc_options` are PETSc's own, as on a command line

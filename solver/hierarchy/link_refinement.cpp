@@ -13,6 +13,7 @@
 
 #include "hierarchy/group_kernel.h"
 #include "transport/enclosure.h"
+#include "transport/pair_kernel.h"
 
 namespace truebox {
 namespace {
@@ -23,17 +24,6 @@ constexpr std::size_t kTasks = 256;  // each starts from all blockers again
 constexpr int kFirstRays = 8;
 
 double gap_m(const ElementNode& a, const ElementNode& b) { return a.box.exteriorDistance(b.box); }
-
-std::vector<PlanarPolygon> polygons_of(const PatchMesh& mesh) {
-  std::vector<PlanarPolygon> polygons;
-  polygons.reserve(mesh.size());
-  Polygon polygon;
-  for (const Patch& patch : mesh.patches) {
-    mesh.polygon_of(patch, polygon);
-    polygons.emplace_back(polygon);
-  }
-  return polygons;
-}
 
 }  // namespace
 
@@ -268,7 +258,7 @@ LinkRefinement::LinkRefinement(const PatchMesh& mesh, const Visibility& visibili
       tree_(tree),
       culling_(culling),
       samples_(group_samples(mesh, tree, seed)),
-      polygons_(polygons_of(mesh)) {}
+      polygons_(planar_polygons(mesh)) {}
 
 Links LinkRefinement::refine(const NodeLight& light, const LinkOptions& options) const {
   // Breadth first until there is work for all threads.

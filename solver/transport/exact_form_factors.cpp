@@ -20,17 +20,6 @@
 namespace truebox {
 namespace {
 
-std::vector<PlanarPolygon> polygons_of(const PatchMesh& mesh) {
-  std::vector<PlanarPolygon> polygons;
-  polygons.reserve(mesh.size());
-  Polygon polygon;
-  for (const Patch& patch : mesh.patches) {
-    mesh.polygon_of(patch, polygon);
-    polygons.emplace_back(polygon);
-  }
-  return polygons;
-}
-
 // A pair that something hides a part of; its blockers are a range of ids kept elsewhere.
 struct PartialPair {
   std::uint32_t receiver, source, first_blocker, blockers;
@@ -81,7 +70,7 @@ class ShadowCones {
 class ExactPairs {
  public:
   ExactPairs(const PatchMesh& mesh, const Scene& scene, const ExactFormFactorOptions& options)
-      : polygons(polygons_of(mesh)),
+      : polygons(planar_polygons(mesh)),
         kernel(polygons, options.relative_tolerance),
         planner(mesh, scene, polygons, 1e-9 * scene.diameter_m(), options.occlusion),
         adaptive_{options.relative_tolerance, 200'000},

@@ -91,4 +91,15 @@ double PairKernel::exchange_area_m2(std::uint32_t i, std::uint32_t j) const {
   return truebox::exchange_area_m2(a, b, tolerance_);
 }
 
+std::vector<PlanarPolygon> planar_polygons(const PatchMesh& mesh) {
+  std::vector<PlanarPolygon> polygons;
+  polygons.reserve(mesh.size());
+  Polygon polygon;
+  for (const Patch& patch : mesh.patches) {
+    mesh.polygon_of(patch, polygon);
+    polygons.emplace_back(polygon);
+  }
+  return polygons;
+}
+
 }  // namespace truebox

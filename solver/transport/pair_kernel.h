@@ -4,9 +4,13 @@
 #include <cstdint>
 #include <vector>
 
+#include "mesh/patch_mesh.h"
 #include "transport/form_factor.h"
 
 namespace truebox {
+
+/// The elements of a mesh with their planes, one a patch.
+std::vector<PlanarPolygon> planar_polygons(const PatchMesh& mesh);
 
 /// Unoccluded exchange areas between the patches of a mesh, to a relative tolerance, fast where
 /// that is easy: product Gauss rules of cos cos / (pi r^2) with 2, 3 or 4 points a direction on

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
-#include <sys/wait.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "image/image_file.h"
+#include "support/run_command.h"
 #include "support/scratch.h"
 
 namespace truebox {
@@ -16,21 +15,8 @@ namespace {
 
 using testing::HasSubstr;
 
-struct ProgramResult {
-  int code = -1;
-  std::string text;  // stdout and stderr
-};
-
-ProgramResult truebox(const std::string& arguments) {
-  FILE* pipe = popen(("'" TRUEBOX_PROGRAM "' " + arguments + " 2>&1").c_str(), "r");
-  ProgramResult result;
-  if (!pipe) return result;
-  char buffer[4096];
-  for (std::size_t n; (n = fread(buffer, 1, sizeof buffer, pipe)) > 0;)
-    result.text.append(buffer, n);
-  const int status = pclose(pipe);
-  result.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return result;
+CommandOutcome truebox(const std::string& arguments) {
+  return run_command("'" TRUEBOX_PROGRAM "' " + arguments);
 }
 
 /// The shipped picture by another program, two of its bands, few elements; `more` is TOML.
@@ -56,7 +42,7 @@ std::string measurement(const std::string& more) {
 
 TEST(FitSceneProgram, WritesEstimatesReportAndResidualMaps) {
   const std::string directory = scratch_path("fit_report"), json = scratch_path("fit.json");
-  const ProgramResult result =
+  const CommandOutcome result =
       truebox("fit " + measurement("") + " -o " + json + " --report " + directory);
   EXPECT_EQ(result.code, 0) << result.text;
   EXPECT_THAT(result.text, HasSubstr("simulated photographs"));
@@ -77,7 +63,8 @@ TEST(FitSceneProgram, WritesEstimatesReportAndResidualMaps) {
 }
 
 TEST(FitSceneProgram, ExitsWithFiveAndNamesTheNullDirection) {
-  const ProgramResult result = truebox("fit " + measurement("[emissions.light]\nfit = \"free\"\n"));
+  const CommandOutcome result =
+      truebox("fit " + measurement("[emissions.light]\nfit = \"free\"\n"));
   EXPECT_EQ(result.code, 5) << result.text;
   EXPECT_THAT(result.text, HasSubstr("rank deficient"));
   EXPECT_THAT(result.text, HasSubstr("emission scale"));
@@ -86,7 +73,7 @@ TEST(FitSceneProgram, ExitsWithFiveAndNamesTheNullDirection) {
 }
 
 TEST(FitSceneProgram, ExitsWithFourAtAMistake) {
-  const ProgramResult result = truebox("fit " + measurement("[emissions.lamp]\nfit = \"free\"\n"));
+  const CommandOutcome result = truebox("fit " + measurement("[emissions.lamp]\nfit = \"free\"\n"));
   EXPECT_EQ(result.code, 4);
   EXPECT_THAT(result.text, HasSubstr("fit_program.toml:17"));
   EXPECT_THAT(result.text, HasSubstr("a material of the scene"));
