@@ -13,7 +13,7 @@ struct DiscontinuityOptions {
   std::size_t cells = 400;  ///< about
   /// Of a line, where elements are as wide as `cells` makes uniform ones; relative to the luminous
   /// flux spread over all surfaces.
-  double least_strength = 0.005;
+  double least_strength = 0.02;
   double apart = 0.3;  ///< lines that run closer are one, in widths of such an element
 };
 

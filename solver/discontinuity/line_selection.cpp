@@ -15,6 +15,7 @@ constexpr double kShortest = 2.0;      // of a line, in distances apart
 constexpr double kTouching = 1e-9;     // of the outline's size
 constexpr double kSoonEnough = 2.0;    // to go on, in distances apart, rather than turn aside
 constexpr double kTurnsAside = 1.5;    // at most, in distances apart
+constexpr double kParallel = 1e-6;     // sine
 constexpr int kMostSamples = 4000;
 
 Vec2 nearest_on(const PlaneSegment& s, const Vec2& x) {
@@ -104,9 +105,11 @@ class Selection {
     double nearest_m = std::numeric_limits<double>::infinity(), ahead_m = nearest_m;
     Vec2 nearest = at;
     for (std::size_t k = 0; k < segments_.size(); ++k) {
-      if (k == i) continue;
+      if (k == i || ends_alongside(segments_[k], at, direction)) continue;
       const Vec2 x = nearest_on(segments_[k], at);
-      if ((x - at).norm() < nearest_m) nearest_m = (x - at).norm(), nearest = x;
+      const bool is_own = direction.dot(x - at) < -kTouching * size_m_ &&
+                          std::abs(cross(direction, x - at)) < kTouching * size_m_;
+      if (!is_own && (x - at).norm() < nearest_m) nearest_m = (x - at).norm(), nearest = x;
       if (const auto hit_m = distance_along(at, direction, segments_[k]))
         ahead_m = std::min(ahead_m, *hit_m);
     }
@@ -115,6 +118,13 @@ class Selection {
       segments_.push_back({at, nearest});
     else if (std::isfinite(ahead_m))
       end = at + ahead_m * direction;
+  }
+
+  // Whether a segment runs along this direction and goes no further than `at`: no line to end on.
+  bool ends_alongside(const PlaneSegment& other, const Vec2& at, const Vec2& direction) const {
+    return std::abs(cross(direction, other.direction())) < kParallel &&
+           std::max(direction.dot(other.from - at), direction.dot(other.to - at)) <=
+               kTouching * size_m_;
   }
 
   std::optional<double> distance_along(const Vec2& at, const Vec2& direction,
