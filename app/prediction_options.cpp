@@ -80,7 +80,11 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       });
   command.add_flag(std::string("--adaptive{") + kDefaultGoal + "}", a.adaptive,
                    "refine where the error comes from instead of everywhere; =everywhere, "
-                   "=camera:NAME or =surface:NAME says whose error");
+                   "=irradiance (rms, relative to its mean), =camera:NAME, =surface:NAME or "
+                   "=parameter:MATERIAL[@CAMERA] (its reflectance in a fit) says whose error");
+  command.add_flag("--discontinuities", a.discontinuities,
+                   "elements follow the lines along which light and its derivatives jump: contacts "
+                   "and outlines of shadows, e.g. solve box.toml --discontinuities -o box.glb");
   command.add_option("--threads", a.threads, "threads, 0 for all")->check(CLI::Range(0, 1024));
   command.add_flag("--quiet", a.quiet, "no progress");
 }
@@ -142,8 +146,17 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
       throw InputError("--adaptive", 0, "a matrix of form factors in one process",
                        a.solve_grid ? "--distributed" : "--form-factors hierarchical");
     const Goal goal = goal_of(a, predicted->scene);
-    solve = [&predicted, goal](const PredictOptions& attempt) {
-      return predict_adaptively(predicted->scene, attempt, goal, &predicted->adapt_steps);
+    solve = [&predicted, goal, &a](const PredictOptions& attempt) {
+      AdaptReport report;
+      auto prediction =
+          predict_adaptively(predicted->scene, attempt, goal, &report, a.discontinuities);
+      predicted->adapt_steps = std::move(report.steps);
+      if (a.discontinuities) predicted->lines = report.lines;
+      return prediction;
+    };
+  } else if (a.discontinuities) {
+    solve = [&predicted](const PredictOptions& attempt) {
+      return predict_along_discontinuities(predicted->scene, attempt, &predicted->lines.emplace());
     };
   }
   const auto start = std::chrono::steady_clock::now();
@@ -208,6 +221,11 @@ std::string describe(const Predicted& p) {
     text +=
         fmt::format("  adapted in {} steps from {} to {} elements, then each cut in four\n",
                     p.adapt_steps.size(), p.adapt_steps.front().cells, p.adapt_steps.back().cells);
+  if (const auto& lines = p.lines)
+    text += fmt::format(
+        "  elements follow {} lines of contact, {} across which the slope of direct light jumps, "
+        "{} its curvature; {} weaker ones are left out\n",
+        lines->of_order[0], lines->of_order[1], lines->of_order[2], lines->left_out);
   if (grid.links)
     text += describe_links(*p.prediction);
   else

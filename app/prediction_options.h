@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,8 +31,9 @@ struct PredictionArguments {
   double link_tolerance = HierarchyOptions{}.relative_tolerance;
   std::size_t memory_MiB = 8192;
   double relative_bound = SolveOptions{}.relative_bound;
-  std::string target_error;  ///< "0.5%" or "0.005": chooses elements and solver bound
-  std::string adaptive;      ///< empty: uniform; else the goal, or kDefaultGoal
+  std::string target_error;      ///< "0.5%" or "0.005": chooses elements and solver bound
+  std::string adaptive;          ///< empty: uniform; else the goal, or kDefaultGoal
+  bool discontinuities = false;  ///< elements follow lines of light and shadow
   bool error_shares = false, sensitivities = false;  ///< as in PredictOptions
   SolveGrid solve_grid;                              ///< as in PredictOptions, and:
   decltype(PredictOptions::watch_finest) watch_finest;
@@ -50,6 +52,7 @@ struct Predicted {
   std::vector<TargetStep> target_steps;  ///< the attempts, where a target error was asked for
   bool misses_target = false;
   std::vector<AdaptStep> adapt_steps;  ///< of the last mesh, where it was adapted
+  std::optional<FollowedLines> lines;  ///< of light and shadow, where elements follow them
   double seconds = 0.0;
 };
 

@@ -12,23 +12,20 @@ constexpr double kBelowSource = 1e-6;
 
 bool same(const Vec3& a, const Vec3& b, double tolerance) { return (a - b).norm() <= tolerance; }
 
-class EventCutter {
- public:
-  EventCutter(const PlanarPolygon& receiver, const PlanarPolygon& source,
-              std::span<const Blocker* const> blockers, std::size_t most_cells)
-      : receiver_(receiver),
-        source_(source),
-        blockers_(blockers),
-        most_cells_(most_cells),
-        size_(receiver.radius_m),
-        cells_{receiver.vertices} {}
+constexpr double kInOnePlane = 1e-9;  // sine of the angle to it
 
-  std::vector<Polygon> run() {
+class EventFinder {
+ public:
+  EventFinder(const PlanarPolygon& receiver, const PlanarPolygon& source,
+              std::span<const Blocker* const> blockers)
+      : receiver_(receiver), source_(source), blockers_(blockers) {}
+
+  std::vector<ViewEvent> run() {
     for (const Blocker* blocker : blockers_) {
       cut_by_plane(*blocker);
       cut_by_blocker(*blocker);
     }
-    return std::move(cells_);
+    return std::move(events_);
   }
 
  private:
@@ -42,7 +39,7 @@ class EventCutter {
       const double h = blocker.plane.distance_m(a), g = blocker.plane.distance_m(b);
       if ((h > 0.0) != (g > 0.0)) crossing.push_back(a + h / (h - g) * (b - a));
     }
-    if (crossing.size() == 2) cut(crossing[0], crossing[1]);
+    if (crossing.size() == 2) events_.push_back({crossing[0], crossing[1], false});
   }
 
   // An edge that two blockers share inside their common outline is no outline of the shadow.
@@ -74,26 +71,38 @@ class EventCutter {
     const Polygon& s = source_.vertices;
     for (std::size_t k = 0; k < n; ++k) {
       if (!inner[k])
-        for (const Vec3& q : s) shadow_of_edge(q, p[k], p[(k + 1) % n]);
+        for (std::size_t l = 0; l < s.size(); ++l)
+          shadow_of_edge(s[l], p[k], p[(k + 1) % n], edge_in_plane(s, l, p[k], p[(k + 1) % n]));
       if (inner[k] && inner[(k + n - 1) % n]) continue;
       for (std::size_t l = 0; l < s.size(); ++l)
-        source_edge_through(p[k], s[l], s[(l + 1) % s.size()]);
+        source_edge_through(p[k], s[l], s[(l + 1) % s.size()],
+                            edge_in_plane(p, k, s[l], s[(l + 1) % s.size()]));
     }
   }
 
+  // Whether an edge at corner k of a polygon lies in the plane of that corner and a-b.
+  static bool edge_in_plane(const Polygon& polygon, std::size_t k, const Vec3& a, const Vec3& b) {
+    const std::size_t n = polygon.size();
+    const Vec3 normal = (a - polygon[k]).cross(b - polygon[k]).normalized();
+    for (const std::size_t other : {(k + 1) % n, (k + n - 1) % n})
+      if (std::abs(normal.dot((polygon[other] - polygon[k]).normalized())) < kInOnePlane)
+        return true;
+    return false;
+  }
+
   // From the source's corner q, edge a-b casts its shadow on the receiver.
-  void shadow_of_edge(const Vec3& q, Vec3 a, Vec3 b) {
+  void shadow_of_edge(const Vec3& q, Vec3 a, Vec3 b, bool of_two_edges) {
     const double hq = height(q), top = hq * (1.0 - kBelowSource);
     if (hq <= 0.0 || !keep_heights(a, b, 0.0, top)) return;
-    cut(projected(q, hq, a), projected(q, hq, b));
+    events_.push_back({projected(q, hq, a), projected(q, hq, b), of_two_edges});
   }
 
   // Edge q-r of the source as the receiver sees it behind the blocker's corner b.
-  void source_edge_through(const Vec3& b, Vec3 q, Vec3 r) {
+  void source_edge_through(const Vec3& b, Vec3 q, Vec3 r, bool of_two_edges) {
     const double hb = height(b);
     if (hb < 0.0 || !keep_heights(q, r, hb / (1.0 - kBelowSource), HUGE_VAL)) return;
     if (height(q) > 0.0 && height(r) > 0.0)
-      cut(projected(q, height(q), b), projected(r, height(r), b));
+      events_.push_back({projected(q, height(q), b), projected(r, height(r), b), of_two_edges});
   }
 
   // Cuts the segment to heights in [low, high]; false if nothing is left.
@@ -120,6 +129,22 @@ class EventCutter {
     return b + hb / (height_q - hb) * (b - q);
   }
 
+  const PlanarPolygon& receiver_;
+  const PlanarPolygon& source_;
+  std::span<const Blocker* const> blockers_;
+  std::vector<ViewEvent> events_;
+};
+
+class EventCutter {
+ public:
+  EventCutter(const PlanarPolygon& receiver, std::size_t most_cells)
+      : receiver_(receiver),
+        most_cells_(most_cells),
+        size_(receiver.radius_m),
+        cells_{receiver.vertices} {}
+
+  const std::vector<Polygon>& cells() const { return cells_; }
+
   void cut(const Vec3& from, const Vec3& to) {
     const Vec3 along = to - from;
     const double length = along.norm();
@@ -136,6 +161,7 @@ class EventCutter {
     }
   }
 
+ private:
   bool crosses_inside(const Polygon& cell, const Vec3& from, const Vec3& along,
                       double length) const {
     double t0 = 0.0, t1 = 1.0;
@@ -156,8 +182,6 @@ class EventCutter {
   }
 
   const PlanarPolygon& receiver_;
-  const PlanarPolygon& source_;
-  std::span<const Blocker* const> blockers_;
   std::size_t most_cells_;
   double size_;
   std::vector<Polygon> cells_;
@@ -166,11 +190,19 @@ class EventCutter {
 
 }  // namespace
 
+std::vector<ViewEvent> view_events(const PlanarPolygon& receiver, const PlanarPolygon& source,
+                                   std::span<const Blocker* const> blockers) {
+  return EventFinder(receiver, source, blockers).run();
+}
+
 std::vector<Polygon> cells_between_events(const PlanarPolygon& receiver,
                                           const PlanarPolygon& source,
                                           std::span<const Blocker* const> blockers,
                                           std::size_t most_cells) {
-  return EventCutter(receiver, source, blockers, most_cells).run();
+  EventCutter cutter(receiver, most_cells);
+  for (const ViewEvent& event : view_events(receiver, source, blockers))
+    cutter.cut(event.from, event.to);
+  return cutter.cells();
 }
 
 }  // namespace truebox
