@@ -17,7 +17,7 @@ using Modules = std::set<std::string>;
 const std::map<std::string, Modules>& allowed_modules() {
   static const Modules kSolver = {"radiometry", "image",     "scene",     "rays",
                                   "mesh",       "transport", "hierarchy", "path_tracer",
-                                  "sensor",     "adaptive",  "export"};
+                                  "sensor",     "adaptive",  "planning",  "export"};
   static const Modules kReference = {"provenance", "analytic", "readings"};
   static const auto join = [](Modules a, const Modules& b) {
     a.insert(b.begin(), b.end());
@@ -40,6 +40,9 @@ const std::map<std::string, Modules>& allowed_modules() {
       {"solver/hierarchy", {"radiometry", "image", "scene", "rays", "mesh", "transport"}},
       {"solver/sensor", {"radiometry", "image", "scene", "mesh", "transport"}},
       {"solver/adaptive", {"radiometry", "image", "scene", "mesh", "transport", "sensor"}},
+      {"solver/planning",
+       {"radiometry", "image", "scene", "rays", "mesh", "path_tracer", "transport", "hierarchy",
+        "sensor", "adaptive"}},
       {"solver/export", {"radiometry", "image", "scene", "mesh", "transport"}},
       {"reference/provenance", {"radiometry", "image"}},
       {"reference/analytic", {"radiometry", "image", "provenance"}},
