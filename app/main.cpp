@@ -2,10 +2,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <stdexcept>
 
 #include "commands.h"
+#include "job_array.h"
 #include "radiometry/input_error.h"
 #include "version.h"
 #include "view_factor_commands.h"
@@ -32,9 +34,9 @@ int run(const Action& action) {
   }
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+// Parses a command line by `parse` and does what it says.
+template <class Parse>
+int parse_and_run(const Parse& parse) {
   CLI::App program{
       "truebox: is this simulation of light true?\n"
       "Predicts with an error bound, measures with an uncertainty, and compares."};
@@ -51,13 +53,24 @@ int main(int argc, char** argv) {
         &add_render_command, &add_calibrate_command, &add_chart_command, &add_align_command,
         &add_fit_command, &add_compare_command, &add_suite_command, &add_accept_command,
         &add_report_command, &add_validate_command, &add_viewfactor_command, &add_sweep_command,
-        &add_export_command, &add_generate_command})
+        &add_merge_command, &add_export_command, &add_generate_command})
     (*add)(program, chosen);
   try {
-    program.parse(argc, argv);
+    parse(program);
   } catch (const CLI::ParseError& error) {
     const int code = program.exit(error);
     return code == 0 ? kAgrees : kUsage;
   }
   return run(chosen);
+}
+
+}  // namespace
+
+int truebox::app::run_command_line(std::vector<std::string> arguments) {
+  std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
+  return parse_and_run([&](CLI::App& program) { program.parse(arguments); });
+}
+
+int main(int argc, char** argv) {
+  return parse_and_run([&](CLI::App& program) { program.parse(argc, argv); });
 }

@@ -12,23 +12,15 @@
 #include <cstdlib>
 #include <optional>
 
+#include "plan_settings.h"
 #include "radiometry/input_error.h"
 #include "scene/scene_file.h"
+#include "transport/streamed_exchange.h"
 
 namespace truebox::app {
 namespace {
-constexpr std::size_t kFirstElements = 1000;  // of a target error: its bound foretells the rest
-
-// "0.5%" or "0.005" as a share.
-std::optional<double> share_of(const std::string& text) {
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  const std::string rest = end;
-  const double share = rest == "%" ? 0.01 * value : value;
-  if (end == text.c_str() || !(rest.empty() || rest == "%") || !(share > 0.0 && share < 1.0))
-    return std::nullopt;
-  return share;
-}
+// Of a target error, unless --elements says where to start: its bound foretells the rest.
+constexpr std::size_t kFirstElements = 1000;
 
 Goal goal_of(const PredictionArguments& a, const Scene& scene) {
   try {
@@ -39,6 +31,24 @@ Goal goal_of(const PredictionArguments& a, const Scene& scene) {
 }
 
 }  // namespace
+
+std::optional<double> share_of(const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  const std::string rest = end;
+  const double share = rest == "%" ? 0.01 * value : value;
+  if (end == text.c_str() || !(rest.empty() || rest == "%") || !(share > 0.0 && share < 1.0))
+    return std::nullopt;
+  return share;
+}
+
+std::string check_share(const std::string& text) {
+  return share_of(text) ? "" : "a share such as 0.5% or 0.005 expected, not " + text;
+}
+
+Scene read_scene_of(const PredictionArguments& a) {
+  return read_scene(a.scene, {.lamp_weighted_bands = a.bands});
+}
 
 void add_prediction_options(CLI::App& command, PredictionArguments& a,
                             const std::vector<std::string>& more_methods) {
@@ -55,11 +65,13 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       ->capture_default_str()
       ->check(CLI::IsMember(methods));
   command
-      .add_option("--form-factors", a.form_factors,
-                  "ray-casting or exact-visibility (shadow outlines, no noise): a matrix of all "
-                  "pairs; hierarchical: links between groups of elements, for many elements")
+      .add_option(
+          "--form-factors", a.form_factors,
+          "ray-casting or exact-visibility (shadow outlines, no noise): a matrix of all "
+          "pairs; streamed: its rows made anew for each pass, slow and small; hierarchical: "
+          "links between groups of elements, for many elements")
       ->capture_default_str()
-      ->check(CLI::IsMember({"ray-casting", "exact-visibility", "hierarchical"}));
+      ->check(CLI::IsMember({"ray-casting", "exact-visibility", "streamed", "hierarchical"}));
   command
       .add_option("--link-tolerance", a.link_tolerance,
                   "hierarchical: share of the mean irradiance that links may leave out, rms")
@@ -75,9 +87,7 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       .add_option("--target-error", a.target_error,
                   "choose elements and solver bound so that each surface's mean is bound to this "
                   "share (\"0.5%\" or 0.005)")
-      ->check([](const std::string& text) {
-        return share_of(text) ? "" : "a share such as 0.5% or 0.005 expected, not " + text;
-      });
+      ->check(check_share);
   command.add_flag(std::string("--adaptive{") + kDefaultGoal + "}", a.adaptive,
                    "refine where the error comes from instead of everywhere; =everywhere, "
                    "=irradiance (rms, relative to its mean), =camera:NAME, =surface:NAME or "
@@ -85,6 +95,18 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
   command.add_flag("--discontinuities", a.discontinuities,
                    "elements follow the lines along which light and its derivatives jump: contacts "
                    "and outlines of shadows, e.g. solve box.toml --discontinuities -o box.glb");
+  command
+      .add_option("--bands", a.bands,
+                  "so many bands, weighted by the lamps' light, instead of the scene's: 16 for "
+                  "colours (see truebox plan --target-colour)")
+      ->check(CLI::Range(1, 1000));
+  auto* automatic = command.add_flag(
+      std::string("--auto{") + kDefaultGoal + "}", a.automatic,
+      "as truebox plan decides for --target-error (1%); =camera:NAME or =surface:NAME as for "
+      "--adaptive");
+  for (const char* decided : {"--elements", "--rays", "--method", "--form-factors",
+                              "--link-tolerance", "--solver-bound", "--adaptive", "--discontinuities"})
+    automatic->excludes(command.get_option(decided));
   command.add_option("--threads", a.threads, "threads, 0 for all")->check(CLI::Range(0, 1024));
   command.add_flag("--quiet", a.quiet, "no progress");
 }
@@ -111,9 +133,11 @@ Progress terminal_progress(bool quiet) {
   };
 }
 
-std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
+std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
   auto predicted = std::make_unique<Predicted>();
-  predicted->scene = read_scene(a.scene);
+  predicted->scene = read_scene_of(wished);
+  const PredictionArguments a =
+      wished.automatic.empty() ? wished : planned(predicted->scene, wished, predicted->plan);
   std::unique_ptr<tbb::global_control> limit;
   if (a.threads > 0)
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
@@ -134,6 +158,10 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
       fmt::print(stderr, "memory: about {} MiB\n", estimated_bytes(a.elements, hierarchy) >> 20);
     options.find_exchange = hierarchical_exchange(hierarchy);
   }
+  if (a.form_factors == "streamed") {
+    options.find_exchange = streamed_exchange();
+    options.form_factors.memory_limit_bytes = std::size_t{1} << 50;  // there is no matrix to fit
+  }
   options.solve.method = method_of_name(a.method);
   options.solve.relative_bound = a.relative_bound;
   options.error_shares = a.error_shares;
@@ -144,7 +172,7 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
   if (!a.adaptive.empty()) {
     if (a.solve_grid || options.find_exchange)
       throw InputError("--adaptive", 0, "a matrix of form factors in one process",
-                       a.solve_grid ? "--distributed" : "--form-factors hierarchical");
+                       a.solve_grid ? "--distributed" : "--form-factors " + a.form_factors);
     const Goal goal = goal_of(a, predicted->scene);
     solve = [&predicted, goal, &a](const PredictOptions& attempt) {
       AdaptReport report;
@@ -163,7 +191,7 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& a) {
   if (a.target_error.empty()) {
     predicted->prediction = solve(options);
   } else {
-    options.elements = std::min(options.elements, kFirstElements);
+    if (options.elements == PredictOptions{}.elements) options.elements = kFirstElements;
     auto targeted = predict_to_target(options, *share_of(a.target_error), solve);
     predicted->prediction = std::move(targeted.prediction);
     predicted->target_steps = std::move(targeted.steps);
@@ -212,9 +240,10 @@ std::string describe_links(const Prediction& prediction) {
 std::string describe(const Predicted& p) {
   const GridSolution& grid = p.prediction->fine();
   const FormFactorSummary& f = grid.form_factors;
-  std::string text = fmt::format("{} elements ({} on the next coarser grid), {} bands, {:.2f} s\n",
-                                 grid.mesh.size(), p.prediction->coarse().mesh.size(),
-                                 p.scene.bands.size(), p.seconds);
+  std::string text = p.plan.empty() ? "" : "  as planned: " + p.plan + "\n";
+  text += fmt::format("{} elements ({} on the next coarser grid), {} bands, {:.2f} s\n",
+                      grid.mesh.size(), p.prediction->coarse().mesh.size(), p.scene.bands.size(),
+                      p.seconds);
   for (const auto& reason : p.prediction->needs().reasons) text += "  " + reason + "\n";
   if (!p.prediction->needs().interreflection) return text;
   if (!p.adapt_steps.empty())

@@ -34,6 +34,8 @@ struct PredictionArguments {
   std::string target_error;      ///< "0.5%" or "0.005": chooses elements and solver bound
   std::string adaptive;          ///< empty: uniform; else the goal, or kDefaultGoal
   bool discontinuities = false;  ///< elements follow lines of light and shadow
+  std::size_t bands = 0;         ///< lamp-weighted ones instead of the scene's; 0: the scene's
+  std::string automatic;         ///< empty: as said here; else as planned, for a goal or kDefaultGoal
   bool error_shares = false, sensitivities = false;  ///< as in PredictOptions
   SolveGrid solve_grid;                              ///< as in PredictOptions, and:
   decltype(PredictOptions::watch_finest) watch_finest;
@@ -51,10 +53,18 @@ struct Predicted {
   std::unique_ptr<Prediction> prediction;
   std::vector<TargetStep> target_steps;  ///< the attempts, where a target error was asked for
   bool misses_target = false;
+  std::string plan;                    ///< what --auto decided, as a command line; empty without it
   std::vector<AdaptStep> adapt_steps;  ///< of the last mesh, where it was adapted
   std::optional<FollowedLines> lines;  ///< of light and shadow, where elements follow them
   double seconds = 0.0;
 };
+
+/// The scene of the arguments, in the bands they ask for.
+Scene read_scene_of(const PredictionArguments& arguments);
+
+/// "0.5%" or "0.005" as a share between 0 and 1; nothing for anything else. And a check for CLI11.
+std::optional<double> share_of(const std::string& text);
+std::string check_share(const std::string& text);
 
 /// Reads and solves; shows progress. The caller checks `prediction->outcome()` and `misses_target`.
 std::unique_ptr<Predicted> predict(const PredictionArguments& arguments);

@@ -11,6 +11,7 @@
 #include "commands.h"
 #include "image/image_file.h"
 #include "prediction_options.h"
+#include "probe_points.h"
 #include "radiometry/input_error.h"
 #include "radiometry/table_file.h"
 
@@ -21,32 +22,6 @@ struct ProbeArguments {
   PredictionArguments prediction;
   std::string points, areas, output;
 };
-
-struct ProbePoint {
-  std::string name;
-  Vec3 position_m, normal;
-};
-
-std::vector<ProbePoint> read_points(const std::string& path, double metres_per_unit) {
-  const TableFile table = read_table(path);
-  std::size_t column[6];
-  const char* const names[] = {"x", "y", "z", "nx", "ny", "nz"};
-  for (int k = 0; k < 6; ++k) column[k] = table.column_index(names[k]);
-  const std::size_t name = table.column_index("name");
-  std::vector<ProbePoint> points;
-  for (std::size_t row = 0; row < table.rows.size(); ++row) {
-    ProbePoint point{table.rows[row][name], {}, {}};
-    for (int k = 0; k < 3; ++k) {
-      point.position_m[k] = metres_per_unit * table.number(row, column[k]);
-      point.normal[k] = table.number(row, column[3 + k]);
-    }
-    if (point.normal.norm() < 1e-12)
-      throw InputError(path, table.row_lines[row], "a normal with a length", "nx = ny = nz = 0");
-    point.normal.normalize();
-    points.push_back(std::move(point));
-  }
-  return points;
-}
 
 struct ProbeArea {
   std::string name;

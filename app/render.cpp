@@ -16,9 +16,12 @@
 #include "commands.h"
 #include "image/image_file.h"
 #include "image/spectral_image.h"
+#include "job_array.h"
 #include "path_tracer/path_tracer.h"
+#include "plan_settings.h"
 #include "prediction_options.h"
 #include "radiometry/input_error.h"
+#include "scene/lamp_spectrum.h"
 #include "scene/scene_file.h"
 #include "sensor/aovs.h"
 #include "sensor_options.h"
@@ -34,6 +37,7 @@ struct RenderArguments {
   std::uint64_t seed = 1;
   double gather_above_percent = -1.0;
   SensorArguments sensor;
+  ArrayArguments array;
 };
 
 double mean_share(const RenderedImage& image) {
@@ -56,6 +60,27 @@ PixelFilter filter_of(const RenderArguments& a) {
   return a.filter == "tent" ? PixelFilter::tent : PixelFilter::box;
 }
 
+// R, G, B again where the lamps' table is finer than the bands: light is not even in those.
+void follow_lamps(Image& radiance, const Scene& scene, const Observer& observer) {
+  const auto weights = display_weights(scene, observer);
+  if (weights.front().Y == band_weights(scene.bands, observer).front().Y) return;
+  const SpectralChannels bands = spectral_channels(radiance);
+  for (std::size_t pixel = 0; pixel < radiance.pixel_count(); ++pixel) {
+    Tristimulus xyz;
+    for (std::size_t b = 0; b < weights.size(); ++b) {
+      const double value = radiance.channels[bands.indices[b]].samples[pixel];
+      xyz.X += value * weights[b].X;
+      xyz.Y += value * weights[b].Y;
+      xyz.Z += value * weights[b].Z;
+    }
+    const LinearRgb rgb = linear_bt709(xyz);
+    const char* const names[] = {"R", "G", "B"};
+    for (std::size_t c = 0; c < 3; ++c)
+      for (Channel& channel : radiance.channels)
+        if (channel.name == names[c]) channel.samples[pixel] = static_cast<float>(rgb[c]);
+  }
+}
+
 // The picture, or the photograph that a sensor would make of it; what there is to say of the
 // latter.
 std::string write_picture(const RenderArguments& a, const Scene& scene, Image& radiance,
@@ -64,6 +89,7 @@ std::string write_picture(const RenderArguments& a, const Scene& scene, Image& r
       std::filesystem::path(reference_directory()) / "colour" / "cie1931_2deg_xyz.csv",
       "CIE 1931 2 deg");
   add_display_channels(radiance, scene.bands, observer);
+  follow_lamps(radiance, scene, observer);
   radiance.attributes["source"] = "truebox " + how + " (simulated) of " + scene.path;
   if (wants_counts(a.sensor, a.output))
     return write_simulated_photograph(a.sensor, a.output, scene, camera_of(scene, a), radiance);
@@ -131,7 +157,7 @@ std::optional<PixelRay> pixel_ray(const std::optional<Ray>& ray) {
 }
 
 int render_paths(const RenderArguments& a) {
-  const Scene scene = read_scene(a.prediction.scene);
+  const Scene scene = read_scene_of(a.prediction);
   const Camera camera(camera_of(scene, a));
   std::unique_ptr<tbb::global_control> limit;
   if (a.prediction.threads > 0)
@@ -185,14 +211,28 @@ void require_fitting_options(const RenderArguments& a) {
     refuse("--standard-error", "path; radiosity has --error-bound");
 }
 
+// By the method that the plan for this camera chooses.
+int render_planned(RenderArguments a) {
+  const Scene scene = read_scene_of(a.prediction);
+  if (a.prediction.automatic == kDefaultGoal && !a.camera.empty())
+    a.prediction.automatic = "camera:" + a.camera;
+  const Plan plan = plan_for(scene, a.prediction);
+  a.prediction = applied(plan, a.prediction);
+  fmt::print("as planned: {}\n", command_line(plan, a.prediction));
+  if (plan.method != PlannedMethod::path_tracing) return render_radiosity(a);
+  if (a.samples == 0) a.samples = std::max(16, plan.paths);
+  return render_paths(a);
+}
+
 int render_scene(const RenderArguments& a) {
   const bool counts = wants_counts(a.sensor, a.output);
   if (!counts && std::filesystem::path(a.output).extension() != ".exr")
     throw InputError(a.output, 0, "an output ending in .exr, .tif or .png", a.output);
   if (counts) {  // before the solve, which may take long
-    const Scene scene = read_scene(a.prediction.scene);
+    const Scene scene = read_scene_of(a.prediction);
     check_sensor(a.sensor, a.output, scene, find_camera(scene, a.camera));
   }
+  if (!a.prediction.automatic.empty()) return render_planned(a);
   return a.prediction.method == "path" ? render_paths(a) : render_radiosity(a);
 }
 
@@ -204,6 +244,7 @@ void add_render_command(CLI::App& program, Action& chosen) {
   auto arguments = std::make_shared<RenderArguments>();
   arguments->prediction.method = "radiosity";
   add_prediction_options(*command, arguments->prediction, {"radiosity", "path"});
+  add_array_options(*command, arguments->array);
   command->add_option("--camera", arguments->camera, "name of the camera in the scene");
   command
       ->add_option("-o,--output", arguments->output,
@@ -241,7 +282,12 @@ void add_render_command(CLI::App& program, Action& chosen) {
       "Example: truebox render reference/cornell_box/cornell_box.toml --camera front -o box.exr");
   command->callback([=, &chosen] {
     require_fitting_options(*arguments);
-    chosen = [=] { return render_scene(*arguments); };
+    chosen = [=] {
+      return arguments->array.is_many()
+                 ? run_array(*command, arguments->array, arguments->prediction.scene,
+                             arguments->output, ".exr")
+                 : render_scene(*arguments);
+    };
   });
 }
 

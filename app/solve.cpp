@@ -11,6 +11,7 @@
 #include "commands.h"
 #include "export/solution_files.h"
 #include "image/image_file.h"
+#include "job_array.h"
 #include "prediction_options.h"
 #include "radiometry/input_error.h"
 #include "ranks.h"
@@ -28,6 +29,7 @@ struct SolveArguments {
   bool distributed = false;
   std::string petsc_options;
   std::string snapshots, camera;
+  ArrayArguments array;
 };
 
 Observer observer() {
@@ -207,7 +209,7 @@ int solve_here(const SolveArguments& a, Ranks* ranks) {
 int solve(const SolveArguments& a) {
   if (!a.snapshots.empty()) {
     if (a.distributed) throw InputError("--snapshots", 0, "one process", "--distributed");
-    const Scene scene = read_scene(a.prediction.scene);
+    const Scene scene = read_scene_of(a.prediction);
     SolveArguments watched = a;
     watched.snapshots.clear();
     watched.prediction.watch_finest = snapshots(scene, {a.snapshots, a.camera, 384, observer()});
@@ -230,6 +232,7 @@ void add_solve_command(CLI::App& program, Action& chosen) {
   auto* command = program.add_subcommand("solve", "radiosity in every band, with an error bound");
   auto arguments = std::make_shared<SolveArguments>();
   add_prediction_options(*command, arguments->prediction);
+  add_array_options(*command, arguments->array);
   arguments->prediction.error_shares = true;
   command->add_flag("--sensitivities", arguments->prediction.sensitivities,
                     "derivatives of every surface's radiosity by every material's reflectance, "
@@ -249,8 +252,19 @@ void add_solve_command(CLI::App& program, Action& chosen) {
                       "PETSc's own, for --distributed: \"-ksp_type gmres -ksp_monitor\"");
   command->footer(
       "Example: truebox solve reference/cornell_box/cornell_box.toml -o box.vtu\n"
-      "         mpirun -n 4 truebox solve scene.toml --distributed -o scene.json");
-  command->callback([=, &chosen] { chosen = [=] { return solve(*arguments); }; });
+      "         mpirun -n 4 truebox solve scene.toml --distributed -o scene.json\n"
+      "         truebox solve a.toml b.toml --vary elements=500,1000 --index 0 --parts 4 -o runs\n"
+      "Several jobs (more scenes, --vary, --index) leave one .json each in the folder of -o, and "
+      "a\n"
+      "table; truebox merge puts the parts of an array together.");
+  command->callback([=, &chosen] {
+    chosen = [=] {
+      return arguments->array.is_many()
+                 ? run_array(*command, arguments->array, arguments->prediction.scene,
+                             arguments->output, ".json")
+                 : solve(*arguments);
+    };
+  });
 }
 
 }  // namespace truebox::app

@@ -4,13 +4,16 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
+#include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
-#include "figures/line_plot.h"
-#include "image/image_file.h"
+#include "commands.h"
+#include "job_array.h"
+#include "prediction_options.h"
+#include "radiometry/input_error.h"
 #include "scene/scene_file.h"
+#include "text_file.h"
+#include "version.h"
 #include "view_factor_commands.h"
 
 namespace truebox::app {
@@ -18,109 +21,140 @@ namespace {
 
 struct Subject {
   const char* name;
-  Sweep (*run)(const Scene& scene, const SweepArguments& arguments);
+  std::unique_ptr<SweepSubject> (*make)(const Scene& scene, const SweepArguments& arguments);
 };
-constexpr Subject kSubjects[] = {{"viewfactors", sweep_view_factors},
+constexpr Subject kSubjects[] = {{"irradiance", sweep_irradiance},
+                                 {"viewfactors", sweep_view_factors},
                                  {"radiosity", sweep_radiosity}};
 
-void print(const Sweep& sweep) {
-  fmt::print("{}\nerror: {}\nagainst: {}\n{:<22}{:<22}{:>12}{:>12}{:>12}\n", sweep.title,
-             sweep.error_name, sweep.reference, "method", "setting", "time / s", "error",
-             "bound held");
-  for (const SweepPoint& p : sweep.points)
-    fmt::print("{:<22}{:<22}{:>12.3g}{:>12.2e}{:>10.1f} %{}\n", p.method, p.setting, p.cpu_s,
-               p.error, 100.0 * p.bound_held, p.on_front ? "  front" : "");
+// Everything that another answer would come from.
+std::string settings_of(const SweepArguments& a) {
+  return fmt::format(
+      "from \"{}\" to \"{}\", {:g} s a point, points \"{}\", reference \"{}\", camera \"{}\", {} "
+      "places, reference to {}, up to {} elements and {} paths",
+      a.from, a.to, a.time_limit_s, a.points, a.reference, a.camera, a.places, a.reference_error,
+      a.largest_elements, a.largest_paths);
 }
 
-nlohmann::json as_json(const Sweep& sweep) {
-  nlohmann::json points = nlohmann::json::array();
-  for (const SweepPoint& p : sweep.points)
-    points.push_back({{"method", p.method},
-                      {"setting", p.setting},
-                      {"cpu_s", p.cpu_s},
-                      {"error", p.error},
-                      {"bound_held", p.bound_held},
-                      {"on_front", p.on_front}});
-  return {{"title", sweep.title},
-          {"error", sweep.error_name},
-          {"reference", sweep.reference},
-          {"points", points}};
+LedgerHeader header_of(const Scene& scene, const SweepArguments& a, const SweepSubject& subject) {
+  LedgerHeader header;
+  header.command = "sweep --of " + a.of;
+  header.version = kVersion;
+  header.inputs["scene"] = fingerprint(scene);
+  header.inputs["settings"] = settings_of(a);
+  for (const std::string& file : {a.points, a.reference})
+    if (!file.empty()) header.inputs["file " + file] = fingerprint(read_text(file));
+  header.jobs = subject.jobs();
+  header.share = a.share;
+  return header;
 }
 
-std::string as_svg(const Sweep& sweep) {
-  LinePlot plot;
-  plot.title = sweep.title + ": error against time";
-  plot.x = {"time", "s", true};
-  plot.y = {sweep.error_name, "1", true};
-  PlotSeries front{"Pareto front", {}, {}};
-  front.dashed = true;
-  for (const SweepPoint& p : sweep.points) {
-    auto series = std::find_if(plot.series.begin(), plot.series.end(),
-                               [&](const PlotSeries& s) { return s.name == p.method; });
-    if (series == plot.series.end()) {
-      plot.series.push_back({p.method, {}, {}});
-      plot.series.back().markers = true;
-      series = plot.series.end() - 1;
-    }
-    series->x.push_back(p.cpu_s);
-    series->y.push_back(p.error);
-  }
-  std::vector<SweepPoint> best;
-  std::copy_if(sweep.points.begin(), sweep.points.end(), std::back_inserter(best),
-               [](const SweepPoint& p) { return p.on_front; });
-  std::sort(best.begin(), best.end(),
-            [](const SweepPoint& a, const SweepPoint& b) { return a.cpu_s < b.cpu_s; });
-  for (const SweepPoint& p : best) {
-    front.x.push_back(p.cpu_s);
-    front.y.push_back(p.error);
-  }
-  plot.series.push_back(std::move(front));
-  return to_svg(plot);
+std::string state_of(const SweepArguments& a) {
+  if (!a.state.empty() || a.output.empty()) return a.state;
+  return state_file(a.output, a.share);
 }
 
-int sweep(const SweepArguments& a) {
+int sweep(SweepArguments a, std::size_t parts) {
+  a.share = share_of_jobs(a.index, parts);
+  if (a.share.parts > 1 && state_of(a).empty())
+    throw InputError("--index", 0, "-o, a folder for the state of this part", "none");
   const Scene scene = read_scene(a.scene);
-  for (const Subject& subject : kSubjects) {
-    if (a.of != subject.name) continue;
-    Sweep result = subject.run(scene, a);
-    mark_front(result.points);
-    print(result);
-    if (!a.json.empty()) write_file_atomically(a.json, as_json(result).dump(1) + "\n");
-    if (!a.plot.empty()) write_file_atomically(a.plot, as_svg(result));
+  const Subject* chosen = nullptr;
+  for (const Subject& subject : kSubjects)
+    if (a.of == subject.name) chosen = &subject;
+  const auto subject = chosen->make(scene, a);
+  const std::string state = state_of(a);
+  if (a.restart && !state.empty()) std::filesystem::remove(state);
+  if (!a.output.empty()) std::filesystem::create_directories(a.output);
+  const LedgerHeader header = header_of(scene, a, *subject);
+  RunLedger ledger(state, header);
+  const auto to_do = ledger.missing();
+  if (to_do.size() < header.jobs.size() && a.share.parts == 1 && !a.quiet)
+    fmt::print(stderr, "continuing {}: {} of {} settings are done\n", state,
+               header.jobs.size() - to_do.size(), header.jobs.size());
+  if (!to_do.empty()) ledger.set_shared(shared_json(subject->prepare()));
+  const auto progress = terminal_progress(a.quiet);
+  for (std::size_t k = 0; k < to_do.size(); ++k) {
+    if (progress)
+      progress(header.jobs[to_do[k]], static_cast<double>(k) / static_cast<double>(to_do.size()));
+    ledger.add(to_do[k], to_json(subject->run(to_do[k])));
+  }
+  if (progress) progress("", 1.0);
+  if (a.share.parts > 1) {
+    fmt::print("part {} of {} is done: {}\n", a.share.index, a.share.parts, state);
     return kAgrees;
   }
-  return kUsage;
+  return present(sweep_of(ledger), a,
+                 {{"Program", fmt::format("truebox {}", kVersion)},
+                  {"Scene", fmt::format("{}, {}", a.scene, header.inputs.at("scene"))},
+                  {"Settings", header.inputs.at("settings")},
+                  {"Time", "processor time of all threads"}});
 }
 
 }  // namespace
-
-void mark_front(std::vector<SweepPoint>& points) {
-  for (SweepPoint& p : points)
-    p.on_front = std::none_of(points.begin(), points.end(), [&](const SweepPoint& q) {
-      return q.cpu_s <= p.cpu_s && q.error <= p.error && (q.cpu_s < p.cpu_s || q.error < p.error);
-    });
-}
 
 void add_sweep_command(CLI::App& program, Action& chosen) {
   auto* command = program.add_subcommand(
       "sweep", "speed against accuracy over methods and settings; the Pareto front");
   auto a = std::make_shared<SweepArguments>();
+  auto parts = std::make_shared<std::size_t>(0);
   std::vector<std::string> subjects;
   for (const Subject& subject : kSubjects) subjects.emplace_back(subject.name);
   command->add_option("SCENE", a->scene, "scene file (TOML)")->required();
-  command->add_option("--of", a->of, "what to compute")->required()->check(CLI::IsMember(subjects));
+  command
+      ->add_option("--of", a->of,
+                   "what to compute: irradiance by all methods, view factors, or "
+                   "the solution of the radiosity system")
+      ->capture_default_str()
+      ->check(CLI::IsMember(subjects));
+  command->add_option("-o,--output", a->output,
+                      "folder for report.html, sweep.json and the state of the run");
   command->add_option("--json", a->json, "every number as JSON");
   command->add_option("--plot", a->plot, "error against time as SVG");
+  command->add_option("--state", a->state,
+                      "where finished settings are kept: a run that was stopped goes on (run.json "
+                      "in the folder of -o)");
+  command->add_flag("--restart", a->restart, "do not continue an earlier run");
+  auto* points = command->add_option(
+      "--points", a->points, "of irradiance: CSV of places as for probe, instead of random");
+  command->add_option("--camera", a->camera, "of irradiance: places that this camera sees")
+      ->excludes(points);
+  command->add_option("--places", a->places, "of irradiance: how many random places")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 10000))
+      ->excludes(points);
+  auto* reference = command->add_option(
+      "--reference", a->reference,
+      "of irradiance: CSV with name,band_nm,irradiance,standard_error at --points; else paths are "
+      "traced");
+  command
+      ->add_option("--reference-error", a->reference_error,
+                   "standard error, rms, to trace that reference to")
+      ->capture_default_str()
+      ->check(check_share)
+      ->excludes(reference);
+  command->add_option("--save-reference", a->save_reference, "write the reference as such a CSV");
+  command->add_option("--largest-elements", a->largest_elements, "finest grid of irradiance")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 200000));
+  command->add_option("--largest-paths", a->largest_paths, "most paths a place of irradiance")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 1 << 24));
   command->add_option("--from", a->from, "of viewfactors: only from this surface");
   command->add_option("--to", a->to, "of viewfactors: only to this surface");
-  command->add_option("--time-limit", a->time_limit_s, "s of one point of the sweep")
+  command
+      ->add_option("--time-limit", a->time_limit_s,
+                   "of viewfactors and radiosity: s of one point of the sweep")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 3600.0));
+  add_share_options(*command, a->index, *parts);
   command->add_flag("--quiet", a->quiet, "no progress");
   command->footer(
-      "Example: truebox sweep reference/independent_renders/closed_box.toml --of viewfactors "
-      "--plot trade.svg");
-  command->callback([=, &chosen] { chosen = [=] { return sweep(*a); }; });
+      "Example: truebox sweep reference/cornell_box/cornell_box.toml -o out/sweep\n"
+      "           --points reference/independent_renders/probe_points.csv\n"
+      "           --reference reference/independent_renders/probe_irradiance.csv\n"
+      "         truebox sweep room.toml --index 0 --parts 4 -o out/sweep   (then truebox merge)");
+  command->callback([=, &chosen] { chosen = [=] { return sweep(*a, *parts); }; });
 }
 
 }  // namespace truebox::app

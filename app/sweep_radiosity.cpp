@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
 #include "prediction_options.h"
 #include "radiometry/input_error.h"
+#include "radiometry/processor_time.h"
 #include "scene/requirements.h"
 #include "sweep.h"
 #include "transport/solve_radiosity.h"
@@ -19,12 +19,6 @@ using Eigen::Index;
 
 constexpr std::size_t kElements = 1200;
 constexpr double kReferenceBound = 1e-13;
-
-double process_cpu_s() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 struct System {
   FormFactors factors;
@@ -61,8 +55,9 @@ SweepPoint measure(const System& system, const BandMatrix& truth, const SolveOpt
       solve_radiosity(system.factors, system.rho, system.source, options, b);
   point.cpu_s = process_cpu_s() - start;
   point.method = method;
-  point.setting =
-      fmt::format("{:.0e}, {:.4g} passes", options.relative_bound, summary.matrix_passes);
+  point.setting = fmt::format("bound {:.0e}", options.relative_bound);
+  point.work = fmt::format("{:.4g} passes", summary.matrix_passes);
+  point.bound = options.relative_bound;
   Index held = 0;
   for (Index k = 0; k < b.cols(); ++k) {
     const double largest = truth.col(k).cwiseAbs().maxCoeff();
@@ -70,49 +65,87 @@ SweepPoint measure(const System& system, const BandMatrix& truth, const SolveOpt
     held += error <= summary.error_bound[k] + kReferenceBound * largest;
     if (largest > 0.0) point.error = std::max(point.error, error / largest);
   }
-  point.error = std::max(point.error, 1e-16);  // a plot has no 0
+  point.error = point.largest_error = std::max(point.error, 1e-16);  // a plot has no 0
   point.bound_held = static_cast<double>(held) / static_cast<double>(b.cols());
   return point;
 }
 
-}  // namespace
+struct Ladder {
+  std::string name;
+  SolveOptions options;
+};
 
-Sweep sweep_radiosity(const Scene& scene, const SweepArguments& a) {
-  require_lambertian(scene);
-  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
-  const auto progress = terminal_progress(a.quiet);
-  const System system = system_of(scene, progress);
-  if (system.source.isZero(0.0)) throw InputError(scene.path, 0, "a surface that emits", "none");
-  BandMatrix truth;
-  SolveOptions exact;
-  exact.relative_bound = kReferenceBound;
-  exact.share_bands = false;
-  solve_radiosity(system.factors, system.rho, system.source, exact, truth);
-  Sweep sweep;
-  sweep.title = fmt::format("radiosity of {} elements in {} bands, one thread",
-                            system.factors.size(), scene.bands.size());
-  sweep.error_name = "largest relative error";
-  sweep.reference =
-      fmt::format("conjugate gradients in every band to a bound of {:.0e}", kReferenceBound);
-  const auto ladder = [&](SolveOptions options, const std::string& name) {
-    for (const double bound : {1e-1, 1e-2, 1e-4, 1e-7, 1e-10}) {
-      options.relative_bound = bound;
-      sweep.points.push_back(measure(system, truth, options, name));
-      if (progress) progress(name, -std::log10(bound) / 10.0);
-      if (options.method == SolveMethod::direct || sweep.points.back().cpu_s > a.time_limit_s)
-        break;  // a factorisation has one accuracy
-    }
-  };
+std::vector<Ladder> ladders() {
+  std::vector<Ladder> all;
   for (const std::string& name : method_names()) {
     SolveOptions options;
     options.method = method_of_name(name);
     options.share_bands = false;
-    ladder(options, name);
+    all.push_back({name, options});
     if (options.method != SolveMethod::conjugate_gradient) continue;
     options.share_bands = true;
-    ladder(options, name + ", shared bands");
+    all.push_back({name + ", shared bands", options});
   }
-  return sweep;
+  return all;
+}
+
+class RadiositySweep : public SweepSubject {
+ public:
+  RadiositySweep(const Scene& scene, const SweepArguments& a)
+      : scene_(scene), arguments_(a), ladders_(ladders()) {
+    require_lambertian(scene);
+  }
+
+  std::vector<std::string> jobs() const override {
+    std::vector<std::string> names;
+    for (const Ladder& ladder : ladders_) names.push_back(ladder.name);
+    return names;
+  }
+
+  Sweep prepare() override {
+    const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+    system_ = system_of(scene_, terminal_progress(arguments_.quiet));
+    if (system_.source.isZero(0.0))
+      throw InputError(scene_.path, 0, "a surface that emits", "none");
+    SolveOptions exact;
+    exact.relative_bound = kReferenceBound;
+    exact.share_bands = false;
+    solve_radiosity(system_.factors, system_.rho, system_.source, exact, truth_);
+    Sweep sweep;
+    sweep.title = fmt::format("radiosity of {} elements in {} bands, one thread",
+                              system_.factors.size(), scene_.bands.size());
+    sweep.error_name = "largest relative error";
+    sweep.reference =
+        fmt::format("conjugate gradients in every band to a bound of {:.0e}", kReferenceBound);
+    sweep.floor = kReferenceBound;
+    return sweep;
+  }
+
+  std::vector<SweepPoint> run(std::size_t job) override {
+    const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+    std::vector<SweepPoint> points;
+    SolveOptions options = ladders_[job].options;
+    for (const double bound : {1e-1, 1e-2, 1e-4, 1e-7, 1e-10}) {
+      options.relative_bound = bound;
+      points.push_back(measure(system_, truth_, options, ladders_[job].name));
+      if (options.method == SolveMethod::direct || points.back().cpu_s > arguments_.time_limit_s)
+        break;  // a factorisation has one accuracy
+    }
+    return points;
+  }
+
+ private:
+  const Scene& scene_;
+  const SweepArguments& arguments_;
+  std::vector<Ladder> ladders_;
+  System system_;
+  BandMatrix truth_;
+};
+
+}  // namespace
+
+std::unique_ptr<SweepSubject> sweep_radiosity(const Scene& scene, const SweepArguments& a) {
+  return std::make_unique<RadiositySweep>(scene, a);
 }
 
 }  // namespace truebox::app

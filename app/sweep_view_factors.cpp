@@ -2,21 +2,15 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <ctime>
 
 #include "prediction_options.h"
 #include "radiometry/input_error.h"
+#include "radiometry/processor_time.h"
 #include "sweep.h"
 #include "transport/view_factors.h"
 
 namespace truebox::app {
 namespace {
-
-double thread_cpu_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 struct Reference {
   std::size_t i, j;
@@ -101,6 +95,9 @@ SweepPoint measure(const ViewFactors& factors, const std::vector<Reference>& pai
     const double error = found[k].exchange_area_m2 - pairs[k].exchange_m2;
     held += std::abs(error) <= found[k].error_bound_m2 + pairs[k].bound_m2;
     const double relative = error / pairs[k].exchange_m2;
+    point.largest_error = std::max(point.largest_error, std::abs(relative));
+    point.bound +=
+        found[k].error_bound_m2 / pairs[k].exchange_m2 / static_cast<double>(pairs.size());
     point.error += relative * relative / static_cast<double>(pairs.size());
   }
   point.error = std::max(std::sqrt(point.error), 1e-16);  // a plot has no 0
@@ -108,32 +105,56 @@ SweepPoint measure(const ViewFactors& factors, const std::vector<Reference>& pai
   return point;
 }
 
+class ViewFactorSweep : public SweepSubject {
+ public:
+  ViewFactorSweep(const Scene& scene, const SweepArguments& a)
+      : scene_(scene), arguments_(a), factors_(scene), ladders_(ladders()) {
+    for (const std::string& name : {a.from, a.to})
+      if (!name.empty() && std::none_of(scene.surfaces.begin(), scene.surfaces.end(),
+                                        [&](const Surface& s) { return s.name == name; }))
+        throw InputError(scene.path, 0, "a surface of the scene", '"' + name + '"');
+  }
+
+  std::vector<std::string> jobs() const override {
+    std::vector<std::string> names;
+    for (const auto& ladder : ladders_) names.emplace_back(name_of(ladder.front().options.method));
+    return names;
+  }
+
+  Sweep prepare() override {
+    pairs_ = references(scene_, factors_, arguments_);
+    if (pairs_.empty()) throw InputError(scene_.path, 0, "surfaces that see each other", "none");
+    double bound = 0.0;
+    for (const Reference& pair : pairs_) bound = std::max(bound, pair.bound_m2 / pair.exchange_m2);
+    Sweep sweep;
+    sweep.title = fmt::format("View factors of {} pairs of {}", pairs_.size(), scene_.path);
+    sweep.error_name = "rms relative error";
+    sweep.reference = fmt::format("exact visibility, largest relative bound {:.1e}", bound);
+    sweep.floor = bound;
+    return sweep;
+  }
+
+  std::vector<SweepPoint> run(std::size_t job) override {
+    std::vector<SweepPoint> points;
+    for (const Setting& setting : ladders_[job]) {
+      points.push_back(measure(factors_, pairs_, setting));
+      if (points.back().cpu_s > arguments_.time_limit_s / 4.0) break;
+    }
+    return points;
+  }
+
+ private:
+  const Scene& scene_;
+  const SweepArguments& arguments_;
+  ViewFactors factors_;
+  std::vector<std::vector<Setting>> ladders_;
+  std::vector<Reference> pairs_;
+};
+
 }  // namespace
 
-Sweep sweep_view_factors(const Scene& scene, const SweepArguments& a) {
-  for (const std::string& name : {a.from, a.to})
-    if (!name.empty() && std::none_of(scene.surfaces.begin(), scene.surfaces.end(),
-                                      [&](const Surface& s) { return s.name == name; }))
-      throw InputError(scene.path, 0, "a surface of the scene", '"' + name + '"');
-  const ViewFactors factors(scene);
-  const auto pairs = references(scene, factors, a);
-  if (pairs.empty()) throw InputError(scene.path, 0, "surfaces that see each other", "none");
-  double bound = 0.0;
-  for (const Reference& pair : pairs) bound = std::max(bound, pair.bound_m2 / pair.exchange_m2);
-  Sweep sweep;
-  sweep.title = fmt::format("View factors of {} pairs of {}", pairs.size(), scene.path);
-  sweep.error_name = "rms relative error";
-  sweep.reference = fmt::format("exact visibility, largest relative bound {:.1e}", bound);
-  const auto progress = terminal_progress(a.quiet);
-  const auto all = ladders();
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    for (const Setting& setting : all[k]) {
-      sweep.points.push_back(measure(factors, pairs, setting));
-      if (sweep.points.back().cpu_s > a.time_limit_s / 4.0) break;
-    }
-    if (progress) progress("sweep", static_cast<double>(k + 1) / static_cast<double>(all.size()));
-  }
-  return sweep;
+std::unique_ptr<SweepSubject> sweep_view_factors(const Scene& scene, const SweepArguments& a) {
+  return std::make_unique<ViewFactorSweep>(scene, a);
 }
 
 }  // namespace truebox::app

@@ -8,11 +8,15 @@
 #include <sstream>
 
 #include "radiometry/input_error.h"
+#include "radiometry/lamp_weighting.h"
 #include "radiometry/planck.h"
 #include "radiometry/table_file.h"
+#include "scene/lamp_spectrum.h"
 
 namespace truebox {
 namespace {
+
+constexpr double kFirstNm = 400.0, kLastNm = 700.0;  // of bands that only have a number
 
 std::string described(const toml::node& node) {
   std::ostringstream text;
@@ -26,7 +30,8 @@ std::string described(const toml::node& node) {
 // Reads one scene file; keeps the path so that every mistake can name its place.
 class Reader {
  public:
-  explicit Reader(std::filesystem::path path) : path_(std::move(path)) {}
+  Reader(std::filesystem::path path, const SceneFileOptions& options)
+      : path_(std::move(path)), options_(options) {}
 
   Scene read() {
     const toml::table root = parse();
@@ -123,7 +128,7 @@ class Reader {
       return;
     }
     const toml::table& bands = table_of(*node, "a table [bands]");
-    allow_keys(bands, {"from_nm", "to_nm", "step_nm", "centres_nm", "total"});
+    allow_keys(bands, {"from_nm", "to_nm", "step_nm", "centres_nm", "count", "scheme", "total"});
     if (const toml::node* total = bands.get("total")) {
       if (!total->is_boolean() || !*total->value<bool>() || bands.size() > 1)
         fail(*total, "total = true and nothing else in [bands]", described(*node));
@@ -133,6 +138,10 @@ class Reader {
       return;
     }
     try {
+      if (bands.contains("count") || bands.contains("scheme")) {
+        read_lamp_weighted(root, bands);
+        return;
+      }
       if (const toml::node* centres = bands.get("centres_nm")) {
         scene_.bands =
             WavelengthGrid::from_centres(numbers(*centres, "a list of band centres in nm"));
@@ -142,9 +151,59 @@ class Reader {
                                                number(need(bands, "to_nm", what)),
                                                number(need(bands, "step_nm", what)));
       }
+      if (options_.lamp_weighted_bands > 0) read_lamp_weighted(root, bands);
     } catch (const std::invalid_argument& error) {
       fail(*node, "usable bands", error.what());
     }
+  }
+
+  // count = 16, scheme = "lamp_weighted", from_nm and to_nm; or as many asked for by the caller,
+  // over what the file's bands cover.
+  void read_lamp_weighted(const toml::table& root, const toml::table& bands) {
+    std::size_t count = options_.lamp_weighted_bands;
+    double from_nm = kFirstNm, to_nm = kLastNm;
+    if (bands.contains("count") || bands.contains("scheme")) {
+      for (const char* key : {"step_nm", "centres_nm"})
+        if (const toml::node* other = bands.get(key))
+          fail(*other, "count and scheme, or step_nm, or centres_nm", "both");
+      const toml::node& scheme = need(bands, "scheme", "scheme = \"lamp_weighted\"");
+      if (text(scheme, "scheme = \"lamp_weighted\"") != "lamp_weighted")
+        fail(scheme, "scheme = \"lamp_weighted\"", described(scheme));
+      const toml::node& wanted = need(bands, "count", "count = number of bands");
+      const double value = number(wanted, "count = number of bands");
+      if (value < 1.0 || value > 1000.0 || value != std::floor(value))
+        fail(wanted, "1 to 1000 bands", described(wanted));
+      if (count == 0) count = static_cast<std::size_t>(value);
+      if (const toml::node* node = bands.get("from_nm")) from_nm = number(*node);
+      if (const toml::node* node = bands.get("to_nm")) to_nm = number(*node);
+    } else {
+      const WavelengthGrid& own = scene_.bands;
+      from_nm = own.centre_nm(0) - 0.5 * own.width_nm(0);
+      to_nm = own.centres_nm().back() + 0.5 * own.widths_nm().back();
+    }
+    scene_.bands = equal_bands(from_nm, to_nm, count);
+    lamp_ = all_lamps(root, bands);
+  }
+
+  // The sum of all emissions, as they are tabulated: what the scene is lit by before anything is
+  // reflected, each square metre of lamp counted alike.
+  TabulatedSpectrum all_lamps(const toml::table& root, const toml::node& bands) const {
+    std::vector<TabulatedSpectrum> lamps;
+    const toml::table* materials = root.get_as<toml::table>("materials");
+    for (const auto& [key, node] : materials ? *materials : toml::table{}) {
+      const toml::table* material = node.as_table();
+      if (!material) continue;
+      if (const toml::node* hot = material->get("temperature_K"))
+        fail(*hot, "lamps with an exitance, because the bands are weighted by them",
+             "a temperature");
+      if (const toml::node* exitance = material->get("exitance")) {
+        lamps.push_back(tabulated(*exitance, "an exitance"));
+        for (double value : lamps.back().values())
+          if (value < 0.0) fail(*exitance, "exitance >= 0", std::to_string(value));
+      }
+    }
+    if (lamps.empty()) fail(bands, "a material with an exitance to weight the bands by", "none");
+    return sum_of(lamps);
   }
 
   // As the file or the source tabulates it; a number holds at all wavelengths.
@@ -174,7 +233,18 @@ class Reader {
   }
 
   std::vector<double> spectrum(const toml::node& node, const char* what) const {
-    return sample_bands(tabulated(node, what), scene_.bands);
+    const TabulatedSpectrum table = tabulated(node, what);
+    return lamp_.empty() ? sample_bands(table, scene_.bands)
+                         : lamp_weighted_means(table, scene_.bands, lamp_);
+  }
+
+  // Light is the mean over a band, whatever weights the reflectances there.
+  std::vector<double> emission(const TabulatedSpectrum& exitance) const {
+    if (lamp_.empty()) return sample_bands(exitance, scene_.bands);
+    std::vector<double> means;
+    for (std::size_t b = 0; b < scene_.bands.size(); ++b)
+      means.push_back(exitance.band_mean(scene_.bands.centre_nm(b), scene_.bands.width_nm(b)));
+    return means;
   }
 
   void read_materials(const toml::table& root) {
@@ -260,7 +330,7 @@ class Reader {
     const toml::node* exitance = table.get("exitance");
     if (!exitance) return;
     material.exitance_spectrum = tabulated(*exitance, "an exitance");
-    material.exitance = RadiantExitance(spectrum(*exitance, "an exitance"));
+    material.exitance = RadiantExitance(emission(material.exitance_spectrum));
     for (double e : material.exitance.values)
       if (e < 0.0) fail(*exitance, "exitance >= 0", std::to_string(e));
   }
@@ -576,13 +646,17 @@ class Reader {
   }
 
   std::filesystem::path path_;
+  SceneFileOptions options_;
   Scene scene_;
   std::set<std::string> names_;
   bool grey_ = false;
+  TabulatedSpectrum lamp_;  // that weights the bands, if any does
 };
 
 }  // namespace
 
-Scene read_scene(const std::filesystem::path& path) { return Reader(path).read(); }
+Scene read_scene(const std::filesystem::path& path, const SceneFileOptions& options) {
+  return Reader(path, options).read();
+}
 
 }  // namespace truebox

@@ -110,7 +110,7 @@ quantum_efficiency = { R = 0.3, G = 0.4, B = 0.2 }
 TEST_F(Program, EveryCommandHasHelpWithAnExample) {
   for (const char* command :
        {"", "demo", "plan", "solve", "probe", "render", "calibrate", "chart", "fit", "compare",
-        "suite", "accept", "report", "validate", "export"}) {
+        "suite", "accept", "report", "validate", "export", "sweep", "merge"}) {
     const Outcome help = run(std::string(command) + " --help");
     EXPECT_EQ(help.code, 0) << command;
     EXPECT_THAT(help.text, HasSubstr("Example")) << command;
@@ -207,7 +207,7 @@ TEST_F(Program, UnknownCameraIs4AndListsTheKnown) {
 TEST_F(Program, PlanSaysWhyAndWritesJson) {
   const Outcome plan = run("plan " + kScene + " --json " + file("plan.json"));
   EXPECT_EQ(plan.code, 0);
-  EXPECT_THAT(plan.text, HasSubstr("occlusion: modelled"));
+  EXPECT_THAT(plan.text, HasSubstr("modelled where shafts leave it open"));
   const auto json = nlohmann::json::parse(text_of(file("plan.json")));
   EXPECT_EQ(json["bands"], 76);
   EXPECT_TRUE(json["occlusion"].get<bool>());

@@ -100,6 +100,38 @@ TEST(SceneFile, ReadsThePublishedCornellBox) {
   EXPECT_NEAR(scene.surfaces[0].pieces[0][0].x(), 0.5528, 1e-15);
 }
 
+// The room of kGood with the lamp's light within its bands.
+std::string weighted_room(const std::string& bands) {
+  std::string text = kGood;
+  const std::string old = "from_nm = 400\nto_nm = 700\nstep_nm = 100";
+  return text.replace(text.find(old), old.size(), bands);
+}
+
+TEST(SceneFile, WeightsBandsByTheLampsLight) {
+  write("scene_file_test_lamp.csv",
+        "# source: made up\nwavelength_nm,power\n400,0\n550,0\n560,2\n570,0\n700,0\n");
+  const Scene scene =
+      read_scene(write("weighted.toml", weighted_room("count = 3\nscheme = \"lamp_weighted\"")));
+  ASSERT_EQ(scene.bands.size(), 3u);
+  EXPECT_NEAR(scene.bands.centre_nm(0), 450.0, 1e-9);
+  EXPECT_NEAR(scene.bands.width_nm(2), 100.0, 1e-9);
+  const Material& white = scene.material_of(scene.surfaces[0]);
+  EXPECT_NEAR(white.reflectance[1], 0.2 + 0.6 * 160.0 / 300.0, 1e-12) << "all light is at 560 nm";
+  EXPECT_NEAR(white.reflectance[0], 0.3, 1e-12) << "no light: the plain mean";
+  const Material& lamp = scene.material_of(scene.surfaces[1]);
+  EXPECT_NEAR(lamp.exitance[1], 20.0 / 100.0, 1e-12) << "light is a plain mean";
+}
+
+TEST(SceneFile, TakesAsManyLampWeightedBandsAsAskedFor) {
+  write("scene_file_test_lamp.csv", "# source: made up\nwavelength_nm,power\n400,1\n700,2\n");
+  const std::string path = write("asked.toml", kGood);
+  const Scene scene = read_scene(path, {.lamp_weighted_bands = 5});
+  ASSERT_EQ(scene.bands.size(), 5u);
+  EXPECT_NEAR(scene.bands.centre_nm(0) - 0.5 * scene.bands.width_nm(0), 350.0, 1e-9)
+      << "over the span of the file's own bands";
+  EXPECT_EQ(read_scene(path).bands.size(), 4u);
+}
+
 struct Mistake {
   std::string name;
   std::string from, to;  // the first `from` is replaced
@@ -221,6 +253,36 @@ INSTANTIATE_TEST_SUITE_P(
                 "",
                 "exitance",
                 {"[bands]"}},
+        Mistake{"unknown_scheme",
+                "step_nm = 100",
+                "count = 3\nscheme = \"even\"",
+                "\"even\"",
+                {"lamp_weighted", "even"}},
+        Mistake{"count_without_scheme", "step_nm = 100", "count = 3", "[bands]", {"scheme"}},
+        Mistake{"scheme_without_count",
+                "step_nm = 100",
+                "scheme = \"lamp_weighted\"",
+                "[bands]",
+                {"count"}},
+        Mistake{"no_bands_at_all",
+                "step_nm = 100",
+                "count = 0\nscheme = \"lamp_weighted\"",
+                "count = 0",
+                {"1 to 1000 bands"}},
+        Mistake{"count_and_step",
+                "step_nm = 100",
+                "step_nm = 100\ncount = 3\nscheme = \"lamp_weighted\"",
+                "step_nm = 100",
+                {"both"}},
+        Mistake{
+            "weighted_by_no_lamp",
+            "step_nm = 100\n\n[materials.white]\nreflectance = { nm = [400, 700], value = [0.2, "
+            "0.8] }\n\n[materials.lamp]\nreflectance = 0.5\nexitance = { file = "
+            "\"scene_file_test_lamp.csv\", column = \"power\" }",
+            "count = 3\nscheme = \"lamp_weighted\"\n\n[materials.white]\nreflectance = "
+            "0.2\n\n[materials.lamp]\nreflectance = 0.5",
+            "[bands]",
+            {"exitance to weight the bands by"}},
         Mistake{"zero_step", "step_nm = 100", "step_nm = 0", "[bands]", {"usable bands"}},
         Mistake{"missing_step", "step_nm = 100", "", "[bands]", {"step_nm"}},
         Mistake{"text_as_reflectance",

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <random>
+
+#include "planning/full_model.h"
+#include "planning/plan.h"
+#include "scene/generated_scene.h"
+#include "scene/scene_file.h"
+#include "support/scratch.h"
+#include "support/tiny_scenes.h"
+#include "transport/enclosure.h"
+#include "transport/predict_to_target.h"
+#include "transport/streamed_exchange.h"
+
+namespace truebox {
+namespace {
+
+Scene cornell_box() {
+  return read_scene(std::string(TRUEBOX_REFERENCE_DIR) + "/cornell_box/cornell_box.toml");
+}
+
+// Convex, grey in seven bands, one face shines with another spectrum: all bands are multiples.
+Scene convex_grey_room() {
+  Scene room = tiny::cube(1.0, 0.5);
+  room.bands = WavelengthGrid::uniform(400, 700, 50);
+  room.materials = {
+      {"grey", Reflectance(7, 0.5), RadiantExitance(7, 0.0)},
+      {"lamp", Reflectance(7, 0.5), RadiantExitance(std::vector<double>{1, 2, 3, 4, 5, 6, 0.5})}};
+  room.surfaces[1].material = 1;
+  return room;
+}
+
+PlanRequest target(double error) {
+  PlanRequest request;
+  request.target_error = error;
+  return request;
+}
+
+const Decision& decision(const Plan& plan, const std::string& topic) {
+  for (const Decision& d : plan.decisions)
+    if (d.topic == topic) return d;
+  throw std::runtime_error("no decision about " + topic);
+}
+
+TEST(MutualVisibility, OfAConvexRoomIsFullBetweenAllFaces) {
+  const MutualVisibility sees(tiny::cube(1.0, 0.5));
+  ASSERT_TRUE(sees.is_complete());
+  for (std::size_t i = 0; i < 6; ++i)
+    for (std::size_t j = 0; j < 6; ++j)
+      EXPECT_EQ(sees.between(i, j), i == j ? Sight::none : Sight::full);
+  EXPECT_EQ(sees.shares().full, 15u);
+}
+
+TEST(MutualVisibility, KnowsBacksAndOneWallThatHidesAll) {
+  Scene scene = tiny::grey_scene(0.5);
+  const Polygon floor = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  Polygon ceiling = {{0, 0, 2}, {0, 1, 2}, {1, 1, 2}, {1, 0, 2}};
+  tiny::add_surface(scene, "floor", floor);
+  tiny::add_surface(scene, "ceiling", ceiling);
+  tiny::add_surface(scene, "roof", {{0, 0, 3}, {1, 0, 3}, {1, 1, 3}, {0, 1, 3}});
+  EXPECT_EQ(MutualVisibility(scene).between(0, 1), Sight::full);
+  EXPECT_EQ(MutualVisibility(scene).between(0, 2), Sight::none) << "the roof turns its back";
+  Scene halved = scene;
+  tiny::add_surface(halved, "shelf", {{0, 0, 1}, {0.5, 0, 1}, {0.5, 1, 1}, {0, 1, 1}});
+  EXPECT_EQ(MutualVisibility(halved).between(0, 1), Sight::partial);
+  EXPECT_EQ(MutualVisibility(halved).between(1, 3), Sight::full);
+  tiny::add_surface(scene, "screen", {{-1, -1, 1}, {2, -1, 1}, {2, 2, 1}, {-1, 2, 1}});
+  EXPECT_EQ(MutualVisibility(scene).between(0, 1), Sight::none);
+}
+
+// Rays between random points of two surfaces: those that reach, of those whose ends face each
+// other.
+struct Rays {
+  int traced = 0, reached = 0;
+};
+Rays rays_between(const Scene& scene, const Visibility& visibility, std::size_t i, std::size_t j,
+                  std::mt19937_64& random) {
+  Rays rays;
+  const auto point_of = [&](const Surface& s, Vec3& normal) {
+    const Polygon& piece = s.pieces[random() % s.pieces.size()];
+    normal = plane_of(piece).normal;
+    return sample_polygon(piece, unit_interval(random()), unit_interval(random()));
+  };
+  for (int k = 0; k < 100; ++k) {
+    Vec3 from_normal, to_normal;
+    const Vec3 from = point_of(scene.surfaces[i], from_normal);
+    const Vec3 to = point_of(scene.surfaces[j], to_normal);
+    if (from_normal.dot(to - from) <= 1e-9 || to_normal.dot(from - to) <= 1e-9) continue;
+    ++rays.traced;
+    rays.reached += !visibility.occluded(from, from_normal, to, to_normal);
+  }
+  return rays;
+}
+
+TEST(MutualVisibility, IsWhatRaysFindInTheCornellBox) {
+  const Scene scene = cornell_box();
+  const MutualVisibility sees(scene);
+  const PatchMesh mesh = uniform_mesh(scene, edge_for_count(scene, 20));
+  const Visibility visibility(mesh, scene);
+  std::mt19937_64 random(3);
+  int certain = 0, partial = 0, mixed = 0;
+  for (std::size_t i = 0; i < scene.surfaces.size(); ++i)
+    for (std::size_t j = i + 1; j < scene.surfaces.size(); ++j) {
+      if (scene.surfaces[i].is_opening || scene.surfaces[j].is_opening) continue;
+      const Rays rays = rays_between(scene, visibility, i, j, random);
+      const std::string pair = scene.surfaces[i].name + ", " + scene.surfaces[j].name;
+      switch (sees.between(i, j)) {
+        case Sight::full: EXPECT_EQ(rays.reached, rays.traced) << pair; break;
+        case Sight::none: EXPECT_EQ(rays.reached, 0) << pair; break;
+        case Sight::partial:
+          ++partial;
+          mixed += rays.reached < rays.traced && rays.reached > 0;
+          continue;
+      }
+      certain += rays.traced > 0;
+    }
+  EXPECT_GT(certain, 30) << "pairs decided without a ray";
+  EXPECT_GT(mixed, partial / 2) << "what is called partial mostly is";
+}
+
+TEST(MutualVisibility, OfManyPiecesIsEstimatedBySampling) {
+  const Scene scene = cornell_box();
+  const MutualVisibility all(scene), sampled(scene, 3, 4000);
+  EXPECT_FALSE(sampled.is_complete());
+  EXPECT_EQ(sampled.shares().pairs, 4000u);
+  const double p = all.shares().share(all.shares().full);
+  EXPECT_NEAR(sampled.shares().share(sampled.shares().full), p,
+              4.0 * std::sqrt(p * (1.0 - p) / 4000.0));
+}
+
+TEST(Plan, OfAConvexGreyRoomPaysForNothingItDoesNotNeed) {
+  const Scene room = convex_grey_room();
+  const Plan plan = make_plan(room, target(0.02));
+  EXPECT_EQ(plan.method, PlannedMethod::radiosity);
+  EXPECT_EQ(plan.exchange, PlannedExchange::full_matrix);
+  EXPECT_EQ(decision(plan, "occlusion").choice, "left out");
+  EXPECT_EQ(decision(plan, "form factors").choice, "analytic");
+  EXPECT_EQ(plan.bands_solved, 1u);
+  EXPECT_EQ(decision(plan, "bands").saving(), 7.0);
+  const auto claims = check_claims(room, plan, 400);
+  ASSERT_EQ(claims.size(), 4u);
+  for (const ClaimCheck& claim : claims) {
+    EXPECT_TRUE(claim.holds()) << claim.claim << ": " << claim.difference << " > " << claim.allowed;
+    EXPECT_LT(claim.planned_work, claim.full_work) << claim.claim;
+  }
+  EXPECT_EQ(claims.front().planned_work, 0.0) << "rays";
+  EXPECT_GT(claims.front().full_work, 1e6) << "rays of a model that tests every pair";
+  EXPECT_GT(claims.back().full_s, 2.0 * claims.back().planned_s);
+}
+
+TEST(Plan, SaysThatAFalseClaimDoesNotHold) {
+  const Scene room = tiny::cube_with_block(1.0, 0.5, 1.0);
+  Plan plan = make_plan(room, target(0.05));
+  plan.needs.occlusion = false;  // it does have a block
+  const auto claims = check_claims(room, plan, 300);
+  EXPECT_FALSE(claims.front().holds()) << claims.front().difference;
+}
+
+TEST(Plan, LeavesInterreflectionOutWhereNothingReflects) {
+  Scene room = tiny::cube_with_block(1.0, 0.0, 0.0);
+  room.materials.push_back({"lamp", Reflectance(1, 0.0), RadiantExitance(1, 1.0)});
+  room.surfaces[1].material = 1;
+  const Plan plan = make_plan(room, target(0.01));
+  EXPECT_EQ(plan.method, PlannedMethod::direct_light);
+  EXPECT_TRUE(std::isinf(decision(plan, "interreflection").saving()));
+  const auto claims = check_claims(room, plan, 300);
+  ASSERT_FALSE(claims.empty());
+  for (const ClaimCheck& claim : claims) EXPECT_TRUE(claim.holds()) << claim.difference;
+}
+
+TEST(Plan, FindsTheBandsOfFewMaterialsOnABasis) {
+  const Scene box = cornell_box();
+  const Plan plan = make_plan(box, target(0.2));
+  EXPECT_LT(plan.bands_solved, 40u);
+  const auto claims = check_claims(box, plan, 300);
+  ASSERT_GE(claims.size(), 2u);
+  for (const ClaimCheck& claim : claims)
+    EXPECT_TRUE(claim.holds()) << claim.claim << ": " << claim.difference << " > " << claim.allowed;
+}
+
+TEST(Plan, ForetellsTheElementsThatATargetTakes) {
+  const Scene room = convex_grey_room();
+  const Plan plan = make_plan(room, target(0.002));
+  PredictOptions options;
+  options.elements = plan.elements;
+  options.form_factors.method = plan.form_factors;
+  options.solve.relative_bound = plan.solver_bound;
+  const TargetedPrediction met = predict_to_target(room, options, 0.002);
+  EXPECT_TRUE(met.is_reached);
+  EXPECT_LE(met.steps.size(), 2u) << "foretold: " << plan.elements;
+  const double excess = met.steps.front().relative_bound / 0.002;
+  EXPECT_GT(excess, 0.2) << "five times finer than needed";
+}
+
+TEST(Plan, StreamsRowsWhereAMatrixDoesNotFitAndTheyAreSoonMade) {
+  PlanRequest request = target(0.02);
+  request.memory_limit_bytes = 1 << 20;
+  const Scene room = tiny::cube_with_block(1.0, 0.5, 1.0);
+  const Plan plan = make_plan(room, request);
+  EXPECT_EQ(plan.exchange, PlannedExchange::streamed);
+  EXPECT_LT(plan.bytes, request.memory_limit_bytes);
+  EXPECT_EQ(decision(plan, "exchange").error_kind, ErrorKind::estimate);
+}
+
+// Largest difference of two solutions on the same mesh, relative to the largest radiosity.
+double difference(const Prediction& a, const Prediction& b) {
+  const BandMatrix first = a.radiosity(), second = b.radiosity();
+  return (first - second).cwiseAbs().maxCoeff() / second.cwiseAbs().maxCoeff();
+}
+
+TEST(StreamedExchange, GivesTheAnswerOfTheMatrixThatItDoesNotHold) {
+  for (const bool convex : {true, false}) {
+    Scene room = convex ? tiny::cube(1.0, 0.6) : tiny::cube_with_block(1.0, 0.6);
+    room.materials.push_back({"lamp", Reflectance(1, 0.3), RadiantExitance(1, 1.0)});
+    room.surfaces[1].material = 1;
+    PredictOptions options;
+    options.elements = 500;
+    options.form_factors.method = FormFactorMethod::exact_visibility;
+    const Prediction held(room, options);
+    options.find_exchange = streamed_exchange();
+    const Prediction streamed(room, options);
+    ASSERT_EQ(streamed.outcome(), SolveOutcome::converged);
+    EXPECT_EQ(streamed.fine().form_factors.closed, held.fine().form_factors.closed);
+    EXPECT_EQ(streamed.fine().usable, held.fine().usable);
+    // What the matrix scales to close and the rows do not: at most their sums' error, each
+    // reflection anew.
+    const double unscaled = held.fine().form_factors.closure_error_max / (1.0 - 0.6);
+    EXPECT_LT(difference(streamed, held), convex ? 1e-6 : unscaled);
+  }
+}
+
+TEST(Plan, TakesLinksWhereOnlyTheyFit) {
+  const Scene museum = [] {
+    GeneratedSceneOptions options;
+    options.patches = 12000;
+    const std::string path = scratch_path("museum.toml");
+    std::ofstream(path) << generated_scene(options);
+    return read_scene(path);
+  }();
+  PlanRequest request = target(0.02);
+  request.memory_limit_bytes = std::size_t{100} << 20;
+  const Plan plan = make_plan(museum, request);
+  EXPECT_EQ(plan.exchange, PlannedExchange::hierarchical);
+  EXPECT_FALSE(plan.pilot) << "too many pieces for a small solve";
+  EXPECT_LE(plan.bytes, request.memory_limit_bytes);
+  EXPECT_EQ(decision(plan, "exchange").error_kind, ErrorKind::estimate);
+  EXPECT_GT(decision(plan, "exchange").saving(), 2.0);
+}
+
+TEST(Plan, TracesPathsOfAMirrorAsFewAsTheNoiseAllows) {
+  Scene room = convex_grey_room();
+  room.materials.push_back({"silver", Reflectance(7, 0.9), RadiantExitance(7, 0.0)});
+  room.materials.back().scattering = Scattering::mirror;
+  room.surfaces[0].material = 2;
+  PlanRequest request = target(0.02);
+  CameraDescription camera;
+  camera.position_m = {0.5, 0.1, 0.5};
+  camera.direction = {0, 1, 0};
+  camera.up = {0, 0, 1};
+  camera.focal_length_m = 0.02;
+  camera.film_m = {0.024, 0.024};
+  camera.pixels = {64, 64};
+  request.camera = camera;
+  const Plan plan = make_plan(room, request);
+  EXPECT_EQ(plan.method, PlannedMethod::path_tracing);
+  ASSERT_TRUE(plan.path_pilot);
+  EXPECT_EQ(plan.paths % 16, 0);
+  EXPECT_GT(plan.paths, 0);
+  EXPECT_TRUE(check_claims(room, plan, 300).empty());
+}
+
+TEST(Plan, RefusesATargetThatIsNone) {
+  EXPECT_THROW(make_plan(tiny::cube(1.0, 0.5, 1.0), target(0.0)), std::invalid_argument);
+  EXPECT_THROW(make_plan(tiny::cube(1.0, 0.5, 1.0), target(1.0)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace truebox
