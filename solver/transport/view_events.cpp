@@ -14,32 +14,36 @@ bool same(const Vec3& a, const Vec3& b, double tolerance) { return (a - b).norm(
 
 class EventCutter {
  public:
-  EventCutter(const PlanarPolygon& receiver, const PlanarPolygon& source,
-              std::span<const Blocker* const> blockers, std::size_t most_cells)
+  EventCutter(const PlanarPolygon& receiver, const PlanarPolygon& source, std::size_t most_cells)
       : receiver_(receiver),
         source_(source),
-        blockers_(blockers),
         most_cells_(most_cells),
         size_(receiver.radius_m),
         cells_{receiver.vertices} {}
 
-  std::vector<Polygon> run() {
+  std::vector<Polygon> run(std::span<const Blocker* const> blockers) {
+    blockers_ = blockers;
     for (const Blocker* blocker : blockers_) {
-      cut_by_plane(*blocker);
+      cut_by_plane(blocker->plane);
       cut_by_blocker(*blocker);
     }
+    return std::move(cells_);
+  }
+
+  std::vector<Polygon> run(std::span<const ConvexOccluder* const> solids) {
+    for (const ConvexOccluder* solid : solids) cut_by_solid(*solid);
     return std::move(cells_);
   }
 
  private:
   double height(const Vec3& v) const { return receiver_.plane.distance_m(v); }
 
-  void cut_by_plane(const Blocker& blocker) {
+  void cut_by_plane(const Plane& plane) {
     Polygon crossing;
     const Polygon& p = receiver_.vertices;
     for (std::size_t k = 0; k < p.size(); ++k) {
       const Vec3 &a = p[k], &b = p[(k + 1) % p.size()];
-      const double h = blocker.plane.distance_m(a), g = blocker.plane.distance_m(b);
+      const double h = plane.distance_m(a), g = plane.distance_m(b);
       if ((h > 0.0) != (g > 0.0)) crossing.push_back(a + h / (h - g) * (b - a));
     }
     if (crossing.size() == 2) cut(crossing[0], crossing[1]);
@@ -79,6 +83,38 @@ class EventCutter {
       for (std::size_t l = 0; l < s.size(); ++l)
         source_edge_through(p[k], s[l], s[(l + 1) % s.size()]);
     }
+  }
+
+  // Bit 0: some of the receiver sees the front of the plane, bit 1: some sees its back.
+  int sides_of(const Plane& plane) const {
+    int sides = 0;
+    for (const Vec3& v : receiver_.vertices) sides |= plane.distance_m(v) > 0.0 ? 1 : 2;
+    return sides;
+  }
+
+  void cut_by_solid(const ConvexOccluder& solid) {
+    std::vector<int> sides;
+    for (const Plane& face : solid.faces) {
+      sides.push_back(sides_of(face));
+      if (sides.back() == 3) cut_by_plane(face);
+    }
+    const Polygon& s = source_.vertices;
+    std::vector<Vec3> corners;
+    for (const ConvexOccluder::Edge& edge : solid.edges) {
+      const int left = sides[edge.left], right = sides[edge.right];
+      if (left == right && left != 3) continue;  // no outline from anywhere
+      for (const Vec3& q : s) shadow_of_edge(q, edge.a, edge.b);
+      corners.push_back(edge.a);
+      corners.push_back(edge.b);
+    }
+    const auto before = [](const Vec3& a, const Vec3& b) {
+      return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+    };
+    std::sort(corners.begin(), corners.end(), before);
+    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    for (const Vec3& corner : corners)
+      for (std::size_t l = 0; l < s.size(); ++l)
+        source_edge_through(corner, s[l], s[(l + 1) % s.size()]);
   }
 
   // From the source's corner q, edge a-b casts its shadow on the receiver.
@@ -170,7 +206,14 @@ std::vector<Polygon> cells_between_events(const PlanarPolygon& receiver,
                                           const PlanarPolygon& source,
                                           std::span<const Blocker* const> blockers,
                                           std::size_t most_cells) {
-  return EventCutter(receiver, source, blockers, most_cells).run();
+  return EventCutter(receiver, source, most_cells).run(blockers);
+}
+
+std::vector<Polygon> cells_between_events(const PlanarPolygon& receiver,
+                                          const PlanarPolygon& source,
+                                          std::span<const ConvexOccluder* const> solids,
+                                          std::size_t most_cells) {
+  return EventCutter(receiver, source, most_cells).run(solids);
 }
 
 }  // namespace truebox
