@@ -104,8 +104,9 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       std::string("--auto{") + kDefaultGoal + "}", a.automatic,
       "as truebox plan decides for --target-error (1%); =camera:NAME or =surface:NAME as for "
       "--adaptive");
-  for (const char* decided : {"--elements", "--rays", "--method", "--form-factors",
-                              "--link-tolerance", "--solver-bound", "--adaptive", "--discontinuities"})
+  for (const char* decided :
+       {"--elements", "--rays", "--method", "--form-factors", "--link-tolerance", "--solver-bound",
+        "--adaptive", "--discontinuities"})
     automatic->excludes(command.get_option(decided));
   command.add_option("--threads", a.threads, "threads, 0 for all")->check(CLI::Range(0, 1024));
   command.add_flag("--quiet", a.quiet, "no progress");

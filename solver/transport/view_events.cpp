@@ -16,27 +16,32 @@ constexpr double kInOnePlane = 1e-9;  // sine of the angle to it
 
 class EventFinder {
  public:
-  EventFinder(const PlanarPolygon& receiver, const PlanarPolygon& source,
-              std::span<const Blocker* const> blockers)
-      : receiver_(receiver), source_(source), blockers_(blockers) {}
+  EventFinder(const PlanarPolygon& receiver, const PlanarPolygon& source)
+      : receiver_(receiver), source_(source) {}
 
-  std::vector<ViewEvent> run() {
+  std::vector<ViewEvent> run(std::span<const Blocker* const> blockers) {
+    blockers_ = blockers;
     for (const Blocker* blocker : blockers_) {
-      cut_by_plane(*blocker);
+      cut_by_plane(blocker->plane);
       cut_by_blocker(*blocker);
     }
+    return std::move(events_);
+  }
+
+  std::vector<ViewEvent> run(std::span<const ConvexOccluder* const> solids) {
+    for (const ConvexOccluder* solid : solids) cut_by_solid(*solid);
     return std::move(events_);
   }
 
  private:
   double height(const Vec3& v) const { return receiver_.plane.distance_m(v); }
 
-  void cut_by_plane(const Blocker& blocker) {
+  void cut_by_plane(const Plane& plane) {
     Polygon crossing;
     const Polygon& p = receiver_.vertices;
     for (std::size_t k = 0; k < p.size(); ++k) {
       const Vec3 &a = p[k], &b = p[(k + 1) % p.size()];
-      const double h = blocker.plane.distance_m(a), g = blocker.plane.distance_m(b);
+      const double h = plane.distance_m(a), g = plane.distance_m(b);
       if ((h > 0.0) != (g > 0.0)) crossing.push_back(a + h / (h - g) * (b - a));
     }
     if (crossing.size() == 2) events_.push_back({crossing[0], crossing[1], false});
@@ -88,6 +93,38 @@ class EventFinder {
       if (std::abs(normal.dot((polygon[other] - polygon[k]).normalized())) < kInOnePlane)
         return true;
     return false;
+  }
+
+  // Bit 0: some of the receiver sees the front of the plane, bit 1: some sees its back.
+  int sides_of(const Plane& plane) const {
+    int sides = 0;
+    for (const Vec3& v : receiver_.vertices) sides |= plane.distance_m(v) > 0.0 ? 1 : 2;
+    return sides;
+  }
+
+  void cut_by_solid(const ConvexOccluder& solid) {
+    std::vector<int> sides;
+    for (const Plane& face : solid.faces) {
+      sides.push_back(sides_of(face));
+      if (sides.back() == 3) cut_by_plane(face);
+    }
+    const Polygon& s = source_.vertices;
+    std::vector<Vec3> corners;
+    for (const ConvexOccluder::Edge& edge : solid.edges) {
+      const int left = sides[edge.left], right = sides[edge.right];
+      if (left == right && left != 3) continue;  // no outline from anywhere
+      for (const Vec3& q : s) shadow_of_edge(q, edge.a, edge.b, false);
+      corners.push_back(edge.a);
+      corners.push_back(edge.b);
+    }
+    const auto before = [](const Vec3& a, const Vec3& b) {
+      return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+    };
+    std::sort(corners.begin(), corners.end(), before);
+    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    for (const Vec3& corner : corners)
+      for (std::size_t l = 0; l < s.size(); ++l)
+        source_edge_through(corner, s[l], s[(l + 1) % s.size()], false);
   }
 
   // From the source's corner q, edge a-b casts its shadow on the receiver.
@@ -188,21 +225,32 @@ class EventCutter {
   Polygon left_, right_;
 };
 
+std::vector<Polygon> cells_between(const PlanarPolygon& receiver,
+                                   const std::vector<ViewEvent>& events, std::size_t most_cells) {
+  EventCutter cutter(receiver, most_cells);
+  for (const ViewEvent& event : events) cutter.cut(event.from, event.to);
+  return cutter.cells();
+}
+
 }  // namespace
 
 std::vector<ViewEvent> view_events(const PlanarPolygon& receiver, const PlanarPolygon& source,
                                    std::span<const Blocker* const> blockers) {
-  return EventFinder(receiver, source, blockers).run();
+  return EventFinder(receiver, source).run(blockers);
 }
 
 std::vector<Polygon> cells_between_events(const PlanarPolygon& receiver,
                                           const PlanarPolygon& source,
                                           std::span<const Blocker* const> blockers,
                                           std::size_t most_cells) {
-  EventCutter cutter(receiver, most_cells);
-  for (const ViewEvent& event : view_events(receiver, source, blockers))
-    cutter.cut(event.from, event.to);
-  return cutter.cells();
+  return cells_between(receiver, view_events(receiver, source, blockers), most_cells);
+}
+
+std::vector<Polygon> cells_between_events(const PlanarPolygon& receiver,
+                                          const PlanarPolygon& source,
+                                          std::span<const ConvexOccluder* const> solids,
+                                          std::size_t most_cells) {
+  return cells_between(receiver, EventFinder(receiver, source).run(solids), most_cells);
 }
 
 }  // namespace truebox

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "transport/convex_occluder.h"
 #include "transport/form_factor.h"
 #include "transport/visible_parts.h"
 
@@ -32,6 +33,10 @@ std::vector<ViewEvent> view_events(const PlanarPolygon& receiver, const PlanarPo
 std::vector<Polygon> cells_between_events(const PlanarPolygon& receiver,
                                           const PlanarPolygon& source,
                                           std::span<const Blocker* const> blockers,
+                                          std::size_t most_cells);
+std::vector<Polygon> cells_between_events(const PlanarPolygon& receiver,
+                                          const PlanarPolygon& source,
+                                          std::span<const ConvexOccluder* const> solids,
                                           std::size_t most_cells);
 
 }  // namespace truebox

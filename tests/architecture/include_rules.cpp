@@ -15,9 +15,9 @@ using Modules = std::set<std::string>;
 // Modules that each module may include, itself aside. Left to right; solver and reference never
 // meet, only calibration and reports see both.
 const std::map<std::string, Modules>& allowed_modules() {
-  static const Modules kSolver = {"radiometry",    "image",     "scene",       "rays",   "mesh",
-                                  "transport",     "hierarchy", "path_tracer", "sensor",
-                                  "discontinuity", "adaptive",  "planning",    "export"};
+  static const Modules kSolver = {
+      "radiometry",  "image",  "scene",         "rays",     "mesh",     "transport", "hierarchy",
+      "path_tracer", "sensor", "discontinuity", "adaptive", "planning", "export"};
   static const Modules kReference = {"provenance", "analytic", "readings"};
   static const auto join = [](Modules a, const Modules& b) {
     a.insert(b.begin(), b.end());
