@@ -58,20 +58,22 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
   command.add_option("--elements", a.elements, "elements of the fine grid, about")
       ->capture_default_str()
       ->check(CLI::Range(4, 200000));
-  command.add_option("--rays", a.rays, "rays of a pair that something may stand between")
+  command
+      .add_option("--rays", a.rays,
+                  "of ray-casting: rays of a pair that something may stand between")
       ->capture_default_str()
       ->check(CLI::Range(4, 4096));
   command.add_option("--method", a.method, "how the radiosity system is solved; see truebox sweep")
       ->capture_default_str()
       ->check(CLI::IsMember(methods));
   command
-      .add_option(
-          "--form-factors", a.form_factors,
-          "ray-casting or exact-visibility (shadow outlines, no noise): a matrix of all "
-          "pairs; streamed: its rows made anew for each pass, slow and small; hierarchical: "
-          "links between groups of elements, for many elements")
+      .add_option("--form-factors", a.form_factors,
+                  "exact-visibility (shadow outlines, no noise) or ray-casting: a matrix of all "
+                  "pairs; streamed: the same as exact-visibility without keeping it, for little "
+                  "memory and some forty times the time; hierarchical: links between groups of "
+                  "elements, for many elements")
       ->capture_default_str()
-      ->check(CLI::IsMember({"ray-casting", "exact-visibility", "streamed", "hierarchical"}));
+      ->check(CLI::IsMember({"exact-visibility", "ray-casting", "streamed", "hierarchical"}));
   command
       .add_option("--link-tolerance", a.link_tolerance,
                   "hierarchical: share of the mean irradiance that links may leave out, rms")
@@ -147,8 +149,11 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
   options.progress = terminal_progress(a.quiet);
   options.elements = a.elements;
   options.form_factors.rays = a.rays;
-  if (a.form_factors == "exact-visibility")
-    options.form_factors.method = FormFactorMethod::exact_visibility;
+  if (a.form_factors == "ray-casting") options.form_factors.method = FormFactorMethod::ray_casting;
+  if (a.form_factors == "streamed") {
+    options.find_exchange = streamed_exchange;
+    options.solve.share_bands = false;  // every pass makes the matrix anew, for one band or for all
+  }
   options.solve_grid = a.solve_grid;
   options.watch_finest = a.watch_finest;
   options.form_factors.memory_limit_bytes = a.memory_MiB << 20;
@@ -158,10 +163,6 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
     if (options.progress)
       fmt::print(stderr, "memory: about {} MiB\n", estimated_bytes(a.elements, hierarchy) >> 20);
     options.find_exchange = hierarchical_exchange(hierarchy);
-  }
-  if (a.form_factors == "streamed") {
-    options.find_exchange = streamed_exchange();
-    options.form_factors.memory_limit_bytes = std::size_t{1} << 50;  // there is no matrix to fit
   }
   options.solve.method = method_of_name(a.method);
   options.solve.relative_bound = a.relative_bound;
@@ -264,6 +265,12 @@ std::string describe(const Predicted& p) {
                         f.method == FormFactorMethod::exact_visibility
                             ? "partly hidden, by outlines of the shadows"
                             : fmt::format("sampled with {} rays", f.rays));
+  if (f.streamed_passes > 0)
+    text += fmt::format(
+        "  factors not kept: {} passes over all pairs to find and close them, {:.0f} to solve; a "
+        "matrix would take {:.0f} MiB\n",
+        f.streamed_passes, std::ceil(grid.solve.matrix_passes),
+        std::pow(static_cast<double>(grid.mesh.size()), 2) * sizeof(double) / (1 << 20));
   if (f.buried_patches > 0)
     text +=
         fmt::format("  {} elements lie under another surface and see nothing\n", f.buried_patches);

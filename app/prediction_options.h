@@ -26,8 +26,9 @@ struct PredictionArguments {
   std::size_t elements = PredictOptions{}.elements;
   int rays = FormFactorOptions{}.rays;
   std::string method = "krylov";
-  /// "ray-casting" or "exact-visibility" for a matrix, or "hierarchical": links between groups
-  std::string form_factors = "ray-casting";
+  /// "exact-visibility" or "ray-casting" for a matrix, "streamed" for none, or "hierarchical":
+  /// links between groups
+  std::string form_factors = "exact-visibility";
   double link_tolerance = HierarchyOptions{}.relative_tolerance;
   std::size_t memory_MiB = 8192;
   double relative_bound = SolveOptions{}.relative_bound;
