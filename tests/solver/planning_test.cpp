@@ -147,7 +147,7 @@ TEST(Plan, OfAConvexGreyRoomPaysForNothingItDoesNotNeed) {
     EXPECT_LT(claim.planned_work, claim.full_work) << claim.claim;
   }
   EXPECT_EQ(claims.front().planned_work, 0.0) << "rays";
-  EXPECT_GT(claims.front().full_work, 1e6) << "rays of a model that tests every pair";
+  EXPECT_GT(claims.front().full_work, 5e5) << "rays of a model that tests every pair";
   EXPECT_GT(claims.back().full_s, 2.0 * claims.back().planned_s);
 }
 
@@ -183,15 +183,15 @@ TEST(Plan, FindsTheBandsOfFewMaterialsOnABasis) {
 
 TEST(Plan, ForetellsTheElementsThatATargetTakes) {
   const Scene room = convex_grey_room();
-  const Plan plan = make_plan(room, target(0.002));
+  const Plan plan = make_plan(room, target(0.005));
   PredictOptions options;
   options.elements = plan.elements;
   options.form_factors.method = plan.form_factors;
   options.solve.relative_bound = plan.solver_bound;
-  const TargetedPrediction met = predict_to_target(room, options, 0.002);
+  const TargetedPrediction met = predict_to_target(room, options, 0.005);
   EXPECT_TRUE(met.is_reached);
   EXPECT_LE(met.steps.size(), 2u) << "foretold: " << plan.elements;
-  const double excess = met.steps.front().relative_bound / 0.002;
+  const double excess = met.steps.front().relative_bound / 0.005;
   EXPECT_GT(excess, 0.2) << "five times finer than needed";
 }
 
