@@ -83,7 +83,7 @@ TEST(PlanProgram, WritesThePlanAndProvesIt) {
   EXPECT_THAT(plan.text, HasSubstr("which surfaces see which"));
   EXPECT_THAT(plan.text, HasSubstr("face 0                  .#####"));
   const json j = json::parse(text_of(file));
-  EXPECT_EQ(j.at("bands_solved"), 1) << "grey walls: the bands are multiples";
+  EXPECT_EQ(j.at("bands_distinct"), 1) << "grey walls: the bands are multiples";
   EXPECT_FALSE(j.at("occlusion").get<bool>());
   EXPECT_EQ(j.at("visibility")[0].at("sees").size(), 5u);
   ASSERT_GE(j.at("claims").size(), 3u);
