@@ -337,6 +337,7 @@ TEST_F(SolveArray, RefusesPartsAndSettingsThatThereAreNot) {
   EXPECT_EQ(run(line_ + " --vary colour=red").code, 4);
   EXPECT_EQ(run(line_ + " --vary rays").code, 4);
   EXPECT_EQ(run(line_ + " --rays 8 --vary rays=8,16").code, 4);
+  EXPECT_THAT(run(line_ + ".json").text, HasSubstr("a folder for the results of all jobs"));
   EXPECT_FALSE(fs::exists(folder_));
 }
 
