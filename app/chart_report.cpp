@@ -256,6 +256,7 @@ ReportPart chart_report(const ChartMeasurement& m, const Requirements& plan,
   overview.blocks.push_back(instrument_text(m));
   overview.blocks.push_back(chart_colour.pictures(colour));
   overview.blocks.push_back(band_table(m));
+  overview.blocks.push_back(Paragraph{"All held-out readings: " + m.missing().in_words()});
   overview.blocks.push_back(score_table(m));
   for (const BandMeasurement& band : m.bands)
     if (!band.note.empty()) overview.blocks.push_back(Paragraph{band.name + ": " + band.note});

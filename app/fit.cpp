@@ -34,6 +34,18 @@ nlohmann::json budget_json(const UncertaintyBudget& budget) {
   return json;
 }
 
+nlohmann::json missing_json(const MissingContribution& missing) {
+  return {{"in_words", missing.in_words()},
+          {"is_missing", missing.is_missing()},
+          {"additive_u", missing.additive_u},
+          {"relative_u", missing.relative_u},
+          {"misses", missing.misses},
+          {"misses_that_read_low", missing.low_misses},
+          {"read_low", missing.low},
+          {"offset", estimate_json(missing.offset)},
+          {"slope", estimate_json(missing.slope)}};
+}
+
 nlohmann::json reading_json(const PatchReading& r) {
   nlohmann::json json{{"patch", r.patch},
                       {"use", to_string(r.standard ? Use::input : Use::held_out)},
@@ -113,8 +125,7 @@ void print_table(const ChartMeasurement& measurement, bool all_patches) {
                    r.at_bound   ? "  at bound"
                    : r.standard ? "  standard"
                                 : "");
-  fmt::print("\n{} of {} held-out readings agree\n", measurement.agreeing(),
-             measurement.held_out());
+  fmt::print("\nheld-out readings: {}\n", measurement.missing().in_words());
 }
 
 int fit(const FitArguments& arguments) {
@@ -139,7 +150,8 @@ int fit(const FitArguments& arguments) {
                         {"source", measurement.file.provenance.source},
                         {"outcome", to_string(measurement.outcome())},
                         {"agreeing", measurement.agreeing()},
-                        {"held_out", measurement.held_out()}};
+                        {"held_out", measurement.held_out()},
+                        {"budget_lacks", missing_json(measurement.missing())}};
     for (const auto& band : measurement.bands) json["bands"].push_back(band_json(band));
     write_file_atomically(arguments.output, json.dump(2) + "\n");
   }
@@ -159,12 +171,14 @@ void add_fit_command(CLI::App& program, Action& chosen) {
   command->add_option("--report", arguments->directory,
                       "scene: folder of a report (HTML, JSON) and residual maps (EXR, PNG)");
   command->add_flag("--select", arguments->select,
-                    "scene: does the data need interreflection, or more than one band?");
+                    "scene: does the data need interreflection, gloss, or more than one band?");
   command->footer(
       "Examples:\n  truebox fit reference/llanos_narrowband/measurement.toml -o fit.json\n"
       "  truebox fit box.toml -o fit.json --report out/fit     box.toml names scene and "
-      "photographs\n"
-      "Ctrl-C ends the fit of a scene with the best so far. "
+      "photographs,\n"
+      "                                                         what is fixed, free or has a "
+      "prior\n"
+      "Ctrl-C ends the fit of a scene with the best so far; before there is one, without a file. "
       "exit code 5 if a fit did not converge or is rank deficient (the null direction is named)");
   command->callback([arguments, &chosen] { chosen = [arguments] { return fit(*arguments); }; });
 }

@@ -37,6 +37,14 @@ class StopOnInterrupt {
   struct sigaction before_ {};
 };
 
+/// Progress for a person, and the way out of what is at work: it throws FitStopped.
+Progress stoppable_progress() {
+  return [shown = terminal_progress()](const std::string& stage, double share) {
+    if (interrupted.load()) throw FitStopped{};
+    if (shown) shown(stage, share);
+  };
+}
+
 std::string number(const FittedParameter& p) {
   if (p.at_bound || !p.determined) return fmt::format("{:>11.5g}   no u      ", p.estimate.value);
   return fmt::format("{:>11.5g} +- {:<9.2g}", p.estimate.value, p.estimate.standard_uncertainty);
@@ -65,7 +73,8 @@ void print_fit(const SceneFitRun& run) {
   print_counts(run);
   fmt::print("{}\n\n", fit.summary.brief());
   for (const FittedParameter& p : fit.parameters)
-    fmt::print("{:<36} {}{}\n", p.name, number(p), p.note.empty() ? "" : "  " + p.note);
+    fmt::print("{:<36} {}{:<4}{}\n", p.name, number(p), p.unit == "1" ? "" : p.unit,
+               p.note.empty() ? "" : "  " + p.note);
   if (fit.null_directions.size() > 1)
     for (const std::string& direction : fit.null_directions)
       fmt::print("not determined: {}\n", direction);
@@ -103,11 +112,11 @@ double rms_relative(const std::vector<FittedReading>& readings) {
 }
 
 std::vector<SurfaceResidual> surface_residuals(const SceneFitRun& run) {
-  const Scene& scene = *run.measurement.scene;
+  const Scene& scene = run.measurement.scene();
   std::vector<SurfaceResidual> all(scene.surfaces.size());
   std::vector<double> predicted(all.size(), 0.0), value = predicted;
   for (const FittedReading& r : run.fit.readings) {
-    const std::size_t i = run.measurement.model->blocks()[r.block].surface;
+    const std::size_t i = run.measurement.model().blocks()[r.block].surface;
     SurfaceResidual& s = all[i];
     ++s.readings;
     value[i] += r.value;
@@ -127,21 +136,27 @@ std::vector<SurfaceResidual> surface_residuals(const SceneFitRun& run) {
 }
 
 int fit_scene_measurement(const FitSceneArguments& arguments) {
-  const Progress progress = terminal_progress();
+  const StopOnInterrupt watch;
+  const Progress progress = stoppable_progress();
   const bool terminal = isatty(STDERR_FILENO) != 0;
   SceneFitRun run;
-  run.measurement = read_scene_fit(read_scene_measurement(arguments.measurement), progress);
-  SceneFitOptions options;
-  {
-    const StopOnInterrupt watch;
-    options.on_step = [&](const FitStep& step) {
-      if (terminal)
-        fmt::print(stderr, "\r\033[Kfit: step {}, chi2 {:.6g}", step.iteration, step.chi2);
-      return interrupted.load();
-    };
+  ShapeFitOptions options;
+  options.on_step = [&](const FitStep& step) {
+    if (terminal)
+      fmt::print(stderr, "\r\033[Kfit: step {}, chi2 {:.6g}", step.iteration, step.chi2);
+    return interrupted.load();
+  };
+  try {
+    SceneMeasurementFile file = read_scene_measurement(arguments.measurement);
+    file.consider_gloss = arguments.select;
+    run.measurement = read_scene_fit(file, progress);
     run.fit = fit_measurement(run.measurement, options, progress);
     if (arguments.select && !run.fit.stopped)
       run.candidates = select_model(run.measurement.problem, run.measurement.held_out, options);
+  } catch (const FitStopped&) {
+    if (terminal) fmt::print(stderr, "\r\033[K");
+    fmt::print(stderr, "truebox: stopped by the user before there was a fit; no file is written\n");
+    return kNotSolved;
   }
   if (terminal) fmt::print(stderr, "\r\033[K");
   const bool usable = run.fit.summary.outcome != Outcome::invalid_problem;

@@ -19,14 +19,14 @@ constexpr std::size_t kShownCorrelations = 30;  // parameters of a table that a 
 
 Table parameter_table(const SceneFit& fit) {
   Table table{"Estimates with their standard uncertainties (k = 1)",
-              {{"Parameter"}, {"Estimate", "", 5}, {"Start", "", 4}, {"Remark"}},
+              {{"Parameter"}, {"Estimate", "", 5}, {"Start", "", 4}, {"Unit"}, {"Remark"}},
               {}};
   for (const FittedParameter& p : fit.parameters)
     table.rows.push_back({p.name,
                           p.at_bound || !p.determined
                               ? Cell(p.estimate.value, Agreement::warning)
                               : Cell(p.estimate.value, p.estimate.standard_uncertainty),
-                          p.start, p.note});
+                          p.start, p.unit.empty() ? "1" : p.unit, p.note});
   return table;
 }
 
@@ -68,7 +68,7 @@ Table correlation_table(const SceneFit& fit) {
 }
 
 Figure spectra_figure(const SceneFitRun& run) {
-  const Scene& scene = *run.measurement.scene;
+  const Scene& scene = run.measurement.scene();
   LinePlot plot{"Fitted reflectances", {"wavelength", "nm"}, {"reflectance", "1"}, {}};
   for (const FittedSpectrum& s : run.fit.spectra) {
     PlotSeries series{scene.materials[s.material].name, scene.bands.centres_nm(), {}};
@@ -146,9 +146,9 @@ Table candidate_table(const std::vector<ModelCandidate>& candidates) {
 nlohmann::json readings_json(const SceneFitRun& run) {
   nlohmann::json all = nlohmann::json::array();
   const auto add = [&](const FittedReading& r, bool held_out) {
-    const ViewBlock& block = run.measurement.model->blocks()[r.block];
+    const ViewBlock& block = run.measurement.model().blocks()[r.block];
     all.push_back({{"plane", run.measurement.problem.planes[r.plane].name},
-                   {"surface", run.measurement.scene->surfaces[block.surface].name},
+                   {"surface", run.measurement.scene().surfaces[block.surface].name},
                    {"element", block.element},
                    {"pixels", block.pixels.size()},
                    {"value", r.value},
@@ -158,6 +158,27 @@ nlohmann::json readings_json(const SceneFitRun& run) {
   };
   for (const FittedReading& r : run.fit.readings) add(r, false);
   for (const FittedReading& r : run.held_out) add(r, true);
+  return all;
+}
+
+/// Cameras that were fitted, as a scene file has them; lengths in mm.
+nlohmann::json cameras_json(const ShapedScene& shaped) {
+  nlohmann::json all = nlohmann::json::object();
+  for (std::size_t v = 0; v < shaped.views.size(); ++v) {
+    const std::string& name = shaped.views[v].camera;
+    const bool is_fitted = std::any_of(shaped.unknowns.begin(), shaped.unknowns.end(),
+                                       [&](const ShapeUnknown& u) { return u.camera == name; });
+    if (!is_fitted) continue;
+    const CameraDescription camera = shaped.camera(shaped.values, v);
+    const auto vector = [](const Vec3& x) { return std::vector<double>{x.x(), x.y(), x.z()}; };
+    all[name] = {
+        {"position_mm", vector(1e3 * camera.position_m)},
+        {"direction", vector(camera.direction)},
+        {"up", vector(camera.up)},
+        {"focal_length_mm", 1e3 * camera.focal_length_m},
+        {"principal_point_mm",
+         {1e3 * camera.lens.principal_point_m[0], 1e3 * camera.lens.principal_point_m[1]}}};
+  }
   return all;
 }
 
@@ -178,7 +199,7 @@ Image residual_map(const SceneFitRun& run) {
     const float values[4] = {static_cast<float>(r.value), static_cast<float>(r.predicted),
                              static_cast<float>(r.value - r.predicted), static_cast<float>(r.z())};
     const auto width = static_cast<std::uint32_t>(m.size_px[r.plane].first);
-    for (const std::uint32_t i : m.model->blocks()[r.block].pixels)
+    for (const std::uint32_t i : m.model().blocks()[r.block].pixels)
       for (std::size_t c = 0; c < 4; ++c)
         map.channels[4 * r.plane + c]
             .samples[map.index(static_cast<int>(i % width), static_cast<int>(i / width))] =
@@ -233,7 +254,7 @@ Report scene_fit_report(const SceneFitRun& run) {
     estimates.blocks.push_back(Paragraph{"Least determined: " + fit.weakest_direction});
   for (const std::string& direction : fit.null_directions)
     estimates.blocks.push_back(Paragraph{"Not determined: " + direction});
-  if (!fit.spectra.empty() && run.measurement.scene->bands.size() > 1)
+  if (!fit.spectra.empty() && run.measurement.scene().bands.size() > 1)
     estimates.blocks.push_back(spectra_figure(run));
   estimates.blocks.push_back(budget_table(fit));
   estimates.blocks.push_back(correlation_table(fit));
@@ -260,7 +281,7 @@ Report scene_fit_report(const SceneFitRun& run) {
 
 nlohmann::json scene_fit_json(const SceneFitRun& run) {
   const SceneFit& fit = run.fit;
-  const Scene& scene = *run.measurement.scene;
+  const Scene& scene = run.measurement.scene();
   nlohmann::json json{{"title", run.measurement.file.title},
                       {"measurement", run.measurement.file.path},
                       {"source", run.measurement.file.provenance.source},
@@ -277,12 +298,14 @@ nlohmann::json scene_fit_json(const SceneFitRun& run) {
                       {"readings", fit.summary.observations},
                       {"effective_readings", fit.effective_readings},
                       {"outliers", fit.outliers},
+                      {"gloss_left_out", fit.gloss_left_out},
                       {"null_directions", fit.null_directions},
                       {"least_determined", fit.weakest_direction},
                       {"bands_nm", scene.bands.centres_nm()}};
   for (const FittedParameter& p : fit.parameters) {
     nlohmann::json item{{"name", p.name},
                         {"kind", p.kind},
+                        {"unit", p.unit.empty() ? "1" : p.unit},
                         {"start", p.start},
                         {"value", p.estimate.value},
                         {"at_bound", p.at_bound},
@@ -320,6 +343,7 @@ nlohmann::json scene_fit_json(const SceneFitRun& run) {
                                 {"mean_percent", r.mean_percent},
                                 {"chi2", r.chi2},
                                 {"largest_z", r.farthest}});
+  json["cameras"] = cameras_json(run.measurement.shaped);
   for (const PlaneCounts& c : run.measurement.counts)
     json["planes"].push_back({{"name", c.name},
                               {"used", c.used},

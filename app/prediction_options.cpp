@@ -58,20 +58,22 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
   command.add_option("--elements", a.elements, "elements of the fine grid, about")
       ->capture_default_str()
       ->check(CLI::Range(4, 200000));
-  command.add_option("--rays", a.rays, "rays of a pair that something may stand between")
+  command
+      .add_option("--rays", a.rays,
+                  "of ray-casting: rays of a pair that something may stand between")
       ->capture_default_str()
       ->check(CLI::Range(4, 4096));
   command.add_option("--method", a.method, "how the radiosity system is solved; see truebox sweep")
       ->capture_default_str()
       ->check(CLI::IsMember(methods));
   command
-      .add_option(
-          "--form-factors", a.form_factors,
-          "ray-casting or exact-visibility (shadow outlines, no noise): a matrix of all "
-          "pairs; streamed: its rows made anew for each pass, slow and small; hierarchical: "
-          "links between groups of elements, for many elements")
+      .add_option("--form-factors", a.form_factors,
+                  "exact-visibility (shadow outlines, no noise) or ray-casting: a matrix of all "
+                  "pairs; streamed: the same as exact-visibility without keeping it, for little "
+                  "memory and some forty times the time; hierarchical: links between groups of "
+                  "elements, for many elements")
       ->capture_default_str()
-      ->check(CLI::IsMember({"ray-casting", "exact-visibility", "streamed", "hierarchical"}));
+      ->check(CLI::IsMember({"exact-visibility", "ray-casting", "streamed", "hierarchical"}));
   command
       .add_option("--link-tolerance", a.link_tolerance,
                   "hierarchical: share of the mean irradiance that links may leave out, rms")
@@ -90,7 +92,11 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       ->check(check_share);
   command.add_flag(std::string("--adaptive{") + kDefaultGoal + "}", a.adaptive,
                    "refine where the error comes from instead of everywhere; =everywhere, "
-                   "=camera:NAME or =surface:NAME says whose error");
+                   "=irradiance (rms, relative to its mean), =camera:NAME, =surface:NAME or "
+                   "=parameter:MATERIAL[@CAMERA] (its reflectance in a fit) says whose error");
+  command.add_flag("--discontinuities", a.discontinuities,
+                   "elements follow the lines along which light and its derivatives jump: contacts "
+                   "and outlines of shadows, e.g. solve box.toml --discontinuities -o box.glb");
   command
       .add_option("--bands", a.bands,
                   "so many bands, weighted by the lamps' light, instead of the scene's: 16 for "
@@ -100,8 +106,9 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       std::string("--auto{") + kDefaultGoal + "}", a.automatic,
       "as truebox plan decides for --target-error (1%); =camera:NAME or =surface:NAME as for "
       "--adaptive");
-  for (const char* decided : {"--elements", "--rays", "--method", "--form-factors",
-                              "--link-tolerance", "--solver-bound", "--adaptive"})
+  for (const char* decided :
+       {"--elements", "--rays", "--method", "--form-factors", "--link-tolerance", "--solver-bound",
+        "--adaptive", "--discontinuities"})
     automatic->excludes(command.get_option(decided));
   command.add_option("--threads", a.threads, "threads, 0 for all")->check(CLI::Range(0, 1024));
   command.add_flag("--quiet", a.quiet, "no progress");
@@ -142,8 +149,11 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
   options.progress = terminal_progress(a.quiet);
   options.elements = a.elements;
   options.form_factors.rays = a.rays;
-  if (a.form_factors == "exact-visibility")
-    options.form_factors.method = FormFactorMethod::exact_visibility;
+  if (a.form_factors == "ray-casting") options.form_factors.method = FormFactorMethod::ray_casting;
+  if (a.form_factors == "streamed") {
+    options.find_exchange = streamed_exchange;
+    options.solve.share_bands = false;  // every pass makes the matrix anew, for one band or for all
+  }
   options.solve_grid = a.solve_grid;
   options.watch_finest = a.watch_finest;
   options.form_factors.memory_limit_bytes = a.memory_MiB << 20;
@@ -153,10 +163,6 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
     if (options.progress)
       fmt::print(stderr, "memory: about {} MiB\n", estimated_bytes(a.elements, hierarchy) >> 20);
     options.find_exchange = hierarchical_exchange(hierarchy);
-  }
-  if (a.form_factors == "streamed") {
-    options.find_exchange = streamed_exchange();
-    options.form_factors.memory_limit_bytes = std::size_t{1} << 50;  // there is no matrix to fit
   }
   options.solve.method = method_of_name(a.method);
   options.solve.relative_bound = a.relative_bound;
@@ -170,8 +176,17 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
       throw InputError("--adaptive", 0, "a matrix of form factors in one process",
                        a.solve_grid ? "--distributed" : "--form-factors " + a.form_factors);
     const Goal goal = goal_of(a, predicted->scene);
-    solve = [&predicted, goal](const PredictOptions& attempt) {
-      return predict_adaptively(predicted->scene, attempt, goal, &predicted->adapt_steps);
+    solve = [&predicted, goal, &a](const PredictOptions& attempt) {
+      AdaptReport report;
+      auto prediction =
+          predict_adaptively(predicted->scene, attempt, goal, &report, a.discontinuities);
+      predicted->adapt_steps = std::move(report.steps);
+      if (a.discontinuities) predicted->lines = report.lines;
+      return prediction;
+    };
+  } else if (a.discontinuities) {
+    solve = [&predicted](const PredictOptions& attempt) {
+      return predict_along_discontinuities(predicted->scene, attempt, &predicted->lines.emplace());
     };
   }
   const auto start = std::chrono::steady_clock::now();
@@ -237,6 +252,11 @@ std::string describe(const Predicted& p) {
     text +=
         fmt::format("  adapted in {} steps from {} to {} elements, then each cut in four\n",
                     p.adapt_steps.size(), p.adapt_steps.front().cells, p.adapt_steps.back().cells);
+  if (const auto& lines = p.lines)
+    text += fmt::format(
+        "  elements follow {} lines of contact, {} across which the slope of direct light jumps, "
+        "{} its curvature; {} weaker ones are left out\n",
+        lines->of_order[0], lines->of_order[1], lines->of_order[2], lines->left_out);
   if (grid.links)
     text += describe_links(*p.prediction);
   else
@@ -245,6 +265,12 @@ std::string describe(const Predicted& p) {
                         f.method == FormFactorMethod::exact_visibility
                             ? "partly hidden, by outlines of the shadows"
                             : fmt::format("sampled with {} rays", f.rays));
+  if (f.streamed_passes > 0)
+    text += fmt::format(
+        "  factors not kept: {} passes over all pairs to find and close them, {:.0f} to solve; a "
+        "matrix would take {:.0f} MiB\n",
+        f.streamed_passes, std::ceil(grid.solve.matrix_passes),
+        std::pow(static_cast<double>(grid.mesh.size()), 2) * sizeof(double) / (1 << 20));
   if (f.buried_patches > 0)
     text +=
         fmt::format("  {} elements lie under another surface and see nothing\n", f.buried_patches);

@@ -26,15 +26,17 @@ struct PredictionArguments {
   std::size_t elements = PredictOptions{}.elements;
   int rays = FormFactorOptions{}.rays;
   std::string method = "krylov";
-  /// "ray-casting" or "exact-visibility" for a matrix, or "hierarchical": links between groups
-  std::string form_factors = "ray-casting";
+  /// "exact-visibility" or "ray-casting" for a matrix, "streamed" for none, or "hierarchical":
+  /// links between groups
+  std::string form_factors = "exact-visibility";
   double link_tolerance = HierarchyOptions{}.relative_tolerance;
   std::size_t memory_MiB = 8192;
   double relative_bound = SolveOptions{}.relative_bound;
-  std::string target_error;  ///< "0.5%" or "0.005": chooses elements and solver bound
-  std::string adaptive;      ///< empty: uniform; else the goal, or kDefaultGoal
-  std::size_t bands = 0;     ///< lamp-weighted ones instead of the scene's; 0: the scene's
-  std::string automatic;     ///< empty: as said here; else as planned, for a goal or kDefaultGoal
+  std::string target_error;      ///< "0.5%" or "0.005": chooses elements and solver bound
+  std::string adaptive;          ///< empty: uniform; else the goal, or kDefaultGoal
+  bool discontinuities = false;  ///< elements follow lines of light and shadow
+  std::size_t bands = 0;         ///< lamp-weighted ones instead of the scene's; 0: the scene's
+  std::string automatic;         ///< empty: as said here; else as planned, for a goal or kDefaultGoal
   bool error_shares = false, sensitivities = false;  ///< as in PredictOptions
   SolveGrid solve_grid;                              ///< as in PredictOptions, and:
   decltype(PredictOptions::watch_finest) watch_finest;
@@ -54,6 +56,7 @@ struct Predicted {
   bool misses_target = false;
   std::string plan;                    ///< what --auto decided, as a command line; empty without it
   std::vector<AdaptStep> adapt_steps;  ///< of the last mesh, where it was adapted
+  std::optional<FollowedLines> lines;  ///< of light and shadow, where elements follow them
   double seconds = 0.0;
 };
 

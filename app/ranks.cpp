@@ -2,11 +2,17 @@
 #include "ranks.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
+#include <vector>
 
 #include "commands.h"
 #include "radiometry/input_error.h"
@@ -68,9 +74,29 @@ std::string Ranks::describe() const {
 
 #else
 
+namespace {
+
+// Becomes the program beside this one that is linked with PETSc and MPI; returns if there is none.
+void become_the_distributed_program() {
+  std::ifstream file("/proc/self/cmdline", std::ios::binary);
+  const std::string line{std::istreambuf_iterator<char>(file), {}};
+  std::vector<std::string> arguments;
+  for (std::size_t at = 0; at < line.size(); at = line.find('\0', at) + 1)
+    arguments.emplace_back(line.c_str() + at);
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  std::error_code none;
+  const auto self = std::filesystem::read_symlink("/proc/self/exe", none);
+  ::execv((self.parent_path() / "truebox-distributed").c_str(), argv.data());
+}
+
+}  // namespace
+
 struct Ranks::State {};
 
 Ranks::Ranks(const std::string&) {
+  become_the_distributed_program();
   throw InputError("--distributed", 0, "a program built with PETSc and MPI",
                    "none (install libpetsc-real-dev and configure again)");
 }

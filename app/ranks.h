@@ -12,7 +12,8 @@ namespace truebox::app {
 /// This process as one of those that `mpirun` started.
 class Ranks {
  public:
-  /// InputError if the program was built without PETSc.
+  /// Where this program is not linked with PETSc, becomes the one beside it that is, and starts
+  /// again; InputError if there is none.
   explicit Ranks(const std::string& petsc_options);
   ~Ranks();
   Ranks(const Ranks&) = delete;

@@ -17,6 +17,7 @@
 #include "ranks.h"
 #include "scene/scene_file.h"
 #include "snapshots.h"
+#include "solve_basis.h"
 #include "transport/net_flux.h"
 #include "walkthrough/walkthrough.h"
 
@@ -30,6 +31,7 @@ struct SolveArguments {
   std::string petsc_options;
   std::string snapshots, camera;
   ArrayArguments array;
+  std::string basis = "constant";
 };
 
 Observer observer() {
@@ -207,6 +209,12 @@ int solve_here(const SolveArguments& a, Ranks* ranks) {
 }
 
 int solve(const SolveArguments& a) {
+  if (a.basis != "constant") {
+    if (!a.snapshots.empty() || a.distributed || !a.summary.empty())
+      throw InputError("--basis", 0, "constant elements for snapshots, ranks and summaries",
+                       a.basis);
+    return solve_on_basis(a.prediction, a.basis, a.output);
+  }
   if (!a.snapshots.empty()) {
     if (a.distributed) throw InputError("--snapshots", 0, "one process", "--distributed");
     const Scene scene = read_scene_of(a.prediction);
@@ -257,7 +265,16 @@ void add_solve_command(CLI::App& program, Action& chosen) {
       "Several jobs (more scenes, --vary, --index) leave one .json each in the folder of -o, and "
       "a\n"
       "table; truebox merge puts the parts of an array together.");
+  command
+      ->add_option("--basis", arguments->basis,
+                   "radiosity on an element: constant, or polynomials (Galerkin), for scenes in "
+                   "which nothing stands between two surfaces: means of the surfaces to many "
+                   "digits; --elements is some hundreds then")
+      ->capture_default_str()
+      ->check(CLI::IsMember(basis_names()));
   command->callback([=, &chosen] {
+    if (arguments->basis != "constant" && command->count("--elements") == 0)
+      arguments->prediction.elements = 0;  // as the degree has it
     chosen = [=] {
       return arguments->array.is_many()
                  ? run_array(*command, arguments->array, arguments->prediction.scene,

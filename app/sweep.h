@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,9 +20,10 @@ struct SweepPoint {
   double largest_error = 0.0;  ///< of a single answer
   double bound = 0.0;          ///< mean of what the method says it can be wrong by; 0: nothing
   double bound_held = 1.0;     ///< share of the answers whose error was within their stated bound
-  bool bound_is_promised = true;  ///< false: the method itself calls its bound an estimate
-  std::string work;               ///< what was done, in counts
-  bool on_front = false;          ///< no other point is both faster and better
+  bool bound_is_promised = true;        ///< false: the method itself calls its bound an estimate
+  std::string work;                     ///< what was done, in counts
+  std::optional<double> matrix_passes;  ///< over the form factors, of a solve
+  bool on_front = false;                ///< no other point is both faster and better
 };
 
 /// Error against time for several methods on the same work.

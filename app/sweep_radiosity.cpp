@@ -58,6 +58,7 @@ SweepPoint measure(const System& system, const BandMatrix& truth, const SolveOpt
   point.setting = fmt::format("bound {:.0e}", options.relative_bound);
   point.work = fmt::format("{:.4g} passes", summary.matrix_passes);
   point.bound = options.relative_bound;
+  point.matrix_passes = summary.matrix_passes;
   Index held = 0;
   for (Index k = 0; k < b.cols(); ++k) {
     const double largest = truth.col(k).cwiseAbs().maxCoeff();

@@ -37,7 +37,7 @@ void print(const Sweep& sweep) {
 
 nlohmann::json as_json(const Sweep& sweep) {
   nlohmann::json points = nlohmann::json::array();
-  for (const SweepPoint& p : sweep.points)
+  for (const SweepPoint& p : sweep.points) {
     points.push_back({{"method", p.method},
                       {"setting", p.setting},
                       {"cpu_s", p.cpu_s},
@@ -48,6 +48,8 @@ nlohmann::json as_json(const Sweep& sweep) {
                       {"bound_is_promised", p.bound_is_promised},
                       {"work", p.work},
                       {"on_front", p.on_front}});
+    if (p.matrix_passes) points.back()["matrix_passes"] = *p.matrix_passes;
+  }
   return {{"title", sweep.title},
           {"error", sweep.error_name},
           {"reference", sweep.reference},
@@ -183,15 +185,17 @@ Report report_of(const Sweep& sweep,
 }
 
 nlohmann::json point_json(const SweepPoint& p) {
-  return {{"method", p.method},
-          {"setting", p.setting},
-          {"cpu_s", p.cpu_s},
-          {"error", p.error},
-          {"largest_error", p.largest_error},
-          {"bound", p.bound},
-          {"bound_held", p.bound_held},
-          {"bound_is_promised", p.bound_is_promised},
-          {"work", p.work}};
+  nlohmann::json json{{"method", p.method},
+                      {"setting", p.setting},
+                      {"cpu_s", p.cpu_s},
+                      {"error", p.error},
+                      {"largest_error", p.largest_error},
+                      {"bound", p.bound},
+                      {"bound_held", p.bound_held},
+                      {"bound_is_promised", p.bound_is_promised},
+                      {"work", p.work}};
+  if (p.matrix_passes) json["matrix_passes"] = *p.matrix_passes;
+  return json;
 }
 
 }  // namespace
@@ -238,6 +242,7 @@ Sweep sweep_of(const RunLedger& ledger) {
       j.at("bound_held").get_to(p.bound_held);
       j.at("bound_is_promised").get_to(p.bound_is_promised);
       j.at("work").get_to(p.work);
+      if (j.contains("matrix_passes")) p.matrix_passes = j.at("matrix_passes").get<double>();
       sweep.points.push_back(std::move(p));
     }
   }

@@ -21,6 +21,7 @@ find_package(tomlplusplus CONFIG REQUIRED)
 find_package(fmt CONFIG REQUIRED)
 find_package(nlohmann_json CONFIG REQUIRED)
 find_package(Ceres CONFIG REQUIRED)
+find_package(GEOS CONFIG REQUIRED)
 find_package(Boost REQUIRED)
 # OpenCV's CMake config comes with all of OpenCV; its image filters alone are one small package.
 find_path(TRUEBOX_OPENCV_INCLUDE opencv2/imgproc.hpp PATH_SUFFIXES opencv4 REQUIRED)

@@ -269,4 +269,12 @@ std::size_t ChartMeasurement::held_out() const {
   return n;
 }
 
+MissingContribution ChartMeasurement::missing() const {
+  std::vector<ComparedPair> pairs;
+  for (const auto& band : bands)
+    for (const PatchReading& r : band.readings)
+      if (!r.standard) pairs.push_back({r.measured, r.reference});
+  return missing_contribution(pairs);
+}
+
 }  // namespace truebox

@@ -14,6 +14,7 @@
 #include "readings/chart.h"
 #include "readings/measurement_file.h"
 #include "uncertainty/en_score.h"
+#include "uncertainty/missing_contribution.h"
 #include "uncertainty/uncertainty_budget.h"
 
 namespace truebox {
@@ -87,6 +88,8 @@ struct ChartMeasurement {
   Outcome outcome() const;       ///< the worst of the bands
   std::size_t agreeing() const;  ///< held-out patches with |E_n| <= 1, all bands
   std::size_t held_out() const;
+  /// What the budget lacks for the held-out patches of all bands.
+  MissingContribution missing() const;
 };
 
 using Progress = std::function<void(const std::string& stage, double fraction)>;

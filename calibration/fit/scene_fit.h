@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -25,12 +26,19 @@ struct SceneFitOptions {
   /// Readings farther out than this many sigma count less, as 1 / |z| (Huber 1964); 0: least
   /// squares.
   double robust_sigma = 0.0;
+  /// Where parameters begin, by name, instead of where the problem has them.
+  std::map<std::string, double> start;
   /// Told each step; true stops with the best so far (outcome not_converged).
   std::function<bool(const FitStep&)> on_step;
 };
 
+/// A progress callback may throw it: what is at work ends, and a fit that has begun ends with the
+/// best so far.
+struct FitStopped {};
+
 struct FittedParameter {
   std::string name, kind;
+  std::string unit;  ///< empty: 1
   double start = 0.0;
   Estimate estimate;  ///< u is 0 and means nothing where `at_bound` or not `determined`
   bool at_bound = false;
@@ -71,6 +79,9 @@ struct SceneFit {
   std::vector<FittedReading> readings;
   SceneState state;  ///< with the estimates
   bool stopped = false;
+  /// What GlossLobe leaves out, largest share of a reading: the mirror image of lit walls, k times
+  /// the mean light that they send. 0 without gloss.
+  double gloss_left_out = 0.0;
   std::size_t outliers = 0;
 
   /// Every number a person should see, in lines.

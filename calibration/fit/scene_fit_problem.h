@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/identifiability.h"
 #include "fit/response_curve.h"
 #include "fit/scene_model.h"
 
@@ -56,6 +57,26 @@ struct ResponseChoice {
   double gamma_u = 0.0;  ///< of each local gamma about 1, if `prior`
 };
 
+/// The strength of a material's gloss (see GlossLobe), one for all bands, 0 <= k < 1.
+struct GlossChoice {
+  Hold hold = Hold::fixed;
+  double value = 0.0;
+  double standard_uncertainty = 0.0;
+};
+
+/// An unknown that moves cameras or surfaces, linear about where the model was built:
+///   B = B(at) (1 + relative (value - at)), block by block and band by band.
+struct ShapeTerm {
+  ParameterName name;
+  std::string unit;
+  Hold hold = Hold::free;
+  double at = 0.0;
+  double known = 0.0, standard_uncertainty = 0.0;  ///< if `prior`
+  double low = 0.0, high = 0.0;                    ///< how far the straight line is trusted
+  double size = 1.0;                               ///< a large change of it
+  BandMatrix relative;                             ///< blocks x bands
+};
+
 /// The mean reading of a block of pixels; u of that mean, errors of its own only.
 struct BlockReading {
   std::size_t block = 0;  ///< into SceneModel::blocks()
@@ -80,6 +101,8 @@ struct SceneFitProblem {
   std::vector<EmissionChoice> emissions;        ///< one a luminaire of the model
   std::vector<PlaneReadings> planes;
   std::optional<ResponseChoice> response;  ///< one curve for all planes
+  std::vector<GlossChoice> gloss;          ///< one a material, or empty: none
+  std::vector<ShapeTerm> shape;
   /// Relative standard uncertainty that all readings of a surface in a plane share (what the model
   /// is wrong by); surfaces x planes, or empty.
   BandMatrix region_relative_u;

@@ -61,6 +61,14 @@ void add_notes(const SceneFitProblem& problem, SceneFit& fit) {
     if (p.at_bound) append(p.note, "at its bound: no uncertainty is claimed");
     if (!p.determined) append(p.note, "not determined");
     if (p.at_initial_value && !p.at_bound) append(p.note, "at its initial value");
+    if (p.kind == "glosses" && p.at_bound) append(p.note, "no gloss is seen");
+    if (p.kind == "glosses" && !p.at_bound && fit.gloss_left_out > 0.0) {
+      std::ostringstream text;
+      text.precision(2);
+      text << "first order: walls mirrored in it are left out, up to " << 100.0 * fit.gloss_left_out
+           << " % of a reading";
+      append(p.note, text.str());
+    }
     if (p.kind == "reflectances" && p.estimate.standard_uncertainty > kUniform)
       append(p.note, "the data say no more than that it lies between 0 and 1");
     std::size_t partner = i;
@@ -95,6 +103,7 @@ std::string SceneFit::full() const {
   text << "\n";
   for (const FittedParameter& p : parameters) {
     text << p.name << " = " << p.estimate.value;
+    if (!p.unit.empty() && p.unit != "1") text << " " << p.unit;
     if (p.determined && !p.at_bound) text << " +- " << p.estimate.standard_uncertainty;
     if (!p.note.empty()) text << "  (" << p.note << ")";
     text << "\n";

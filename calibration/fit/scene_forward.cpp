@@ -3,164 +3,11 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <limits>
 #include <numbers>
-#include <sstream>
 
 namespace truebox {
-namespace {
 
 using Eigen::Index;
-
-// The solvers need rho < 1, and beyond this a bounce takes less than rounding leaves.
-constexpr double kHighestReflectance = 1.0 - 1e-6;
-constexpr double kHighestFactor = 1e6;
-
-std::string nm_text(double nm) {
-  std::ostringstream text;
-  text << nm << " nm";
-  return text.str();
-}
-
-}  // namespace
-
-SceneForward::SceneForward(const SceneFitProblem& problem)
-    : problem_(problem), fixed_(problem.model->state()) {
-  fixed_.interreflection = problem.interreflection;
-  add_reflectances();
-  add_emissions();
-  add_gains();
-  add_response();
-  start_gains();
-}
-
-std::size_t SceneForward::add(SceneParameter parameter) {
-  parameters_.push_back(std::move(parameter));
-  return parameters_.size() - 1;
-}
-
-void SceneForward::add_reflectances() {
-  const Scene& scene = problem_.model->scene();
-  spectra_.resize(scene.materials.size());
-  for (std::size_t m = 0; m < scene.materials.size(); ++m) {
-    const ReflectanceChoice& choice = problem_.reflectances[m];
-    if (choice.hold == Hold::fixed || choice.same_as) continue;
-    const Eigen::MatrixXd basis = spectral_basis(choice.basis, choice.count, scene.bands);
-    const Eigen::VectorXd start =
-        Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(basis).solve(
-            fixed_.reflectance.row(static_cast<Index>(m)).transpose());
-    spectra_[m] = {basis, parameters_.size()};
-    for (Index k = 0; k < basis.cols(); ++k) {
-      const std::string item = "reflectance of " + scene.materials[m].name;
-      std::string name = "reflectance " + scene.materials[m].name;
-      if (basis.cols() > 1)
-        name += choice.basis == SpectralBasis::bands
-                    ? ", " + nm_text(scene.bands.centre_nm(static_cast<std::size_t>(k)))
-                    : ", coefficient " + std::to_string(k + 1);
-      const double at = std::clamp(start[k], 0.0, kHighestReflectance);
-      add({{name, item, "reflectances"}, at, 0.0, kHighestReflectance, std::max(at, 0.05)});
-    }
-    add_reflectance_priors(m);
-  }
-  for (std::size_t m = 0; m < scene.materials.size(); ++m)
-    if (const auto& other = problem_.reflectances[m].same_as) {
-      spectra_[m] = spectra_[*other];
-      fixed_.reflectance.row(static_cast<Index>(m)) =
-          fixed_.reflectance.row(static_cast<Index>(*other));
-    }
-}
-
-void SceneForward::add_reflectance_priors(std::size_t material) {
-  const ReflectanceChoice& choice = problem_.reflectances[material];
-  const SpectrumMap& map = spectra_[material];
-  const auto count = static_cast<std::size_t>(map.basis.cols());
-  if (choice.hold == Hold::prior && choice.standard_uncertainty > 0.0)
-    for (std::size_t k = 0; k < count; ++k) {
-      const double weight = 1.0 / choice.standard_uncertainty;
-      priors_.push_back({"prior of reflectances",
-                         {{map.first + k, weight}},
-                         weight * parameters_[map.first + k].start});
-    }
-  if (choice.curvature_u > 0.0)
-    for (std::size_t k = 1; k + 1 < count; ++k) {
-      const double weight = 1.0 / choice.curvature_u;
-      priors_.push_back({"smoothness of spectra",
-                         {{map.first + k - 1, weight},
-                          {map.first + k, -2.0 * weight},
-                          {map.first + k + 1, weight}},
-                         0.0});
-    }
-  if (!choice.spectra) return;
-  const Eigen::LLT<Eigen::MatrixXd> root(choice.spectra->covariance);
-  const Eigen::MatrixXd rows = root.matrixL().solve(map.basis);
-  const Eigen::VectorXd values = root.matrixL().solve(choice.spectra->mean);
-  for (Index r = 0; r < rows.rows(); ++r) {
-    PriorRow prior{"prior of measured spectra", {}, values[r]};
-    for (std::size_t k = 0; k < count; ++k)
-      prior.terms.emplace_back(map.first + k, rows(r, static_cast<Index>(k)));
-    priors_.push_back(std::move(prior));
-  }
-}
-
-void SceneForward::add_emissions() {
-  const Scene& scene = problem_.model->scene();
-  const auto& lamps = problem_.model->lamps();
-  emission_.resize(lamps.size());
-  for (std::size_t l = 0; l < lamps.size(); ++l) {
-    const EmissionChoice& choice = problem_.emissions[l];
-    if (choice.hold == Hold::fixed) continue;
-    const std::string of = lamps.size() > 1 ? " of " + scene.materials[lamps[l]].name : "";
-    const auto factor = [&](const std::string& at) {
-      const std::size_t k =
-          add({{"emission scale" + of + at,
-                (choice.each_band ? "emission spectrum" : "emission scale") + of, "emissions"},
-               1.0,
-               0.0,
-               kHighestFactor});
-      if (choice.hold == Hold::prior)
-        priors_.push_back(
-            {"prior of emission", {{k, 1.0 / choice.relative_u}}, 1.0 / choice.relative_u});
-      return k;
-    };
-    emission_[l].assign(scene.bands.size(), choice.each_band ? 0 : factor(""));
-    if (choice.each_band)
-      for (std::size_t b = 0; b < scene.bands.size(); ++b)
-        emission_[l][b] = factor(", " + nm_text(scene.bands.centre_nm(b)));
-  }
-}
-
-void SceneForward::add_gains() {
-  gain_.resize(problem_.planes.size());
-  for (std::size_t k = 0; k < gain_.size(); ++k) {
-    const PlaneReadings& plane = problem_.planes[k];
-    if (plane.gain == Hold::fixed) continue;
-    const std::string name = "gain of " + plane.name;
-    gain_[k] = add({{name, name, "gains"},
-                    plane.gain_value,
-                    0.0,
-                    kHighestFactor * plane.gain_value,
-                    plane.gain_value});
-    const double u = plane.gain_relative_u * plane.gain_value;
-    if (plane.gain == Hold::prior)
-      priors_.push_back({"exposure", {{*gain_[k], 1.0 / u}}, plane.gain_value / u});
-  }
-}
-
-void SceneForward::add_response() {
-  if (!problem_.response) return;
-  const ResponseChoice& choice = *problem_.response;
-  curve_.emplace(choice.segments, choice.decades, choice.white);
-  if (choice.hold == Hold::fixed) return;
-  for (int j = 0; j < choice.segments; ++j) {
-    std::ostringstream range;
-    range.precision(2);
-    range << "response gamma, " << curve_->low(j) << " to " << curve_->high(j) << " of white";
-    gamma_.push_back(add({{range.str(), "camera response", "responses"}, 1.0, 0.02, 20.0}));
-    if (choice.hold == Hold::prior)
-      priors_.push_back(
-          {"prior of response", {{gamma_.back(), 1.0 / choice.gamma_u}}, 1.0 / choice.gamma_u});
-  }
-}
 
 Eigen::VectorXd SceneForward::start() const {
   Eigen::VectorXd x(static_cast<Index>(parameters_.size()));
@@ -168,43 +15,22 @@ Eigen::VectorXd SceneForward::start() const {
   return x;
 }
 
-// A gain far from its start would first drive reflectances to their bounds: free gains start where
-// their plane fits best.
-void SceneForward::start_gains() {
-  Eigen::VectorXd predicted;
-  if (!predict(start(), predicted, nullptr)) return;
-  Index row = 0;
-  for (std::size_t k = 0; k < problem_.planes.size(); ++k) {
-    double product = 0.0, square = 0.0;
-    for (const BlockReading& r : problem_.planes[k].readings) {
-      const double p = predicted[row++], weight = 1.0 / (r.value * r.value + 1e-300);
-      product += weight * p * r.value;
-      square += weight * p * p;
-    }
-    if (!gain_[k] || problem_.planes[k].gain != Hold::free) continue;
-    SceneParameter& gain = parameters_[*gain_[k]];
-    if (!(product > 0.0) || !(square > 0.0)) continue;
-    gain.start *= product / square;
-    gain.size = gain.start;
-    gain.high = kHighestFactor * gain.start;
-  }
-}
-
-SceneState SceneForward::state_of(const Eigen::VectorXd& x) const {
-  SceneState state = fixed_;
+// By reflectances, exitances and gloss; `slopes`: d reading / d B of the reading, one a band.
+void SceneForward::differentiate(const BlockRadiosity& b, Eigen::Index i,
+                                 const Eigen::RowVectorXd& slopes,
+                                 Eigen::Ref<Eigen::RowVectorXd> row) const {
   for (std::size_t m = 0; m < spectra_.size(); ++m)
     if (spectra_[m].basis.cols() > 0)
-      state.reflectance.row(static_cast<Index>(m)) =
-          (spectra_[m].basis *
-           x.segment(static_cast<Index>(spectra_[m].first), spectra_[m].basis.cols()))
-              .transpose()
-              .cwiseMax(0.0)
-              .cwiseMin(kHighestReflectance);
+      row.segment(static_cast<Index>(spectra_[m].first), spectra_[m].basis.cols()) +=
+          b.by_reflectance[m].row(i).cwiseProduct(slopes) * spectra_[m].basis;
   for (std::size_t l = 0; l < emission_.size(); ++l)
-    for (std::size_t b = 0; b < emission_[l].size(); ++b)
-      state.exitance(static_cast<Index>(l), static_cast<Index>(b)) *=
-          x[static_cast<Index>(emission_[l][b])];
-  return state;
+    for (std::size_t band = 0; band < emission_[l].size(); ++band) {
+      const auto c = static_cast<Index>(band);
+      row[static_cast<Index>(emission_[l][band])] +=
+          slopes[c] * fixed_.exitance(static_cast<Index>(l), c) * b.by_exitance[l](i, c);
+    }
+  for (std::size_t m = 0; m < gloss_.size(); ++m)
+    if (gloss_[m]) row[static_cast<Index>(*gloss_[m])] += b.by_gloss[m].row(i).dot(slopes);
 }
 
 bool SceneForward::predict(const Eigen::VectorXd& x, Eigen::VectorXd& readings,
@@ -212,6 +38,7 @@ bool SceneForward::predict(const Eigen::VectorXd& x, Eigen::VectorXd& readings,
   WantedDerivatives wanted;
   for (const SpectrumMap& map : spectra_) wanted.reflectance.push_back(map.basis.cols() > 0);
   for (const auto& factors : emission_) wanted.exitance = wanted.exitance || !factors.empty();
+  for (const auto& gloss : gloss_) wanted.gloss = wanted.gloss || gloss.has_value();
   const BlockRadiosity b = problem_.model->radiosity(state_of(x), derivatives ? &wanted : nullptr);
   const auto rows = static_cast<Index>(problem_.readings());
   readings.resize(rows);
@@ -223,10 +50,16 @@ bool SceneForward::predict(const Eigen::VectorXd& x, Eigen::VectorXd& readings,
   for (std::size_t k = 0; k < problem_.planes.size(); ++k) {
     const PlaneReadings& plane = problem_.planes[k];
     const double gain = gain_[k] ? x[static_cast<Index>(*gain_[k])] : plane.gain_value;
-    const Eigen::VectorXd weights = plane.band_weights / std::numbers::pi;
+    const Eigen::RowVectorXd weights = plane.band_weights.transpose() / std::numbers::pi;
     for (const BlockReading& reading : plane.readings) {
-      const auto i = static_cast<Index>(reading.block);
-      const double light = b.value.row(i).dot(weights);
+      const auto block = static_cast<Index>(reading.block);
+      const Eigen::RowVectorXd radiosity = b.value.row(block);
+      Eigen::RowVectorXd factor = Eigen::RowVectorXd::Ones(radiosity.size());
+      for (std::size_t j = 0; j < shape_.size(); ++j)
+        if (shape_[j])
+          factor += (x[static_cast<Index>(*shape_[j])] - problem_.shape[j].at) *
+                    problem_.shape[j].relative.row(block);
+      const double light = radiosity.cwiseProduct(factor).dot(weights);
       double slope = 1.0;
       readings[row] = gain * light;
       if (curve_) {
@@ -239,18 +72,14 @@ bool SceneForward::predict(const Eigen::VectorXd& x, Eigen::VectorXd& readings,
       }
       if (derivatives) {
         auto d = derivatives->row(row);
-        for (std::size_t m = 0; m < spectra_.size(); ++m)
-          if (spectra_[m].basis.cols() > 0)
-            d.segment(static_cast<Index>(spectra_[m].first), spectra_[m].basis.cols()) +=
+        Eigen::RowVectorXd parts = d;
+        differentiate(b, block, slope * gain * weights.cwiseProduct(factor), parts);
+        d = parts;
+        for (std::size_t j = 0; j < shape_.size(); ++j)
+          if (shape_[j])
+            d[static_cast<Index>(*shape_[j])] =
                 slope * gain *
-                (b.by_reflectance[m].row(i).cwiseProduct(weights.transpose()) * spectra_[m].basis);
-        for (std::size_t l = 0; l < emission_.size(); ++l)
-          for (std::size_t band = 0; band < emission_[l].size(); ++band) {
-            const auto c = static_cast<Index>(band);
-            d[static_cast<Index>(emission_[l][band])] += slope * gain * weights[c] *
-                                                         fixed_.exitance(static_cast<Index>(l), c) *
-                                                         b.by_exitance[l](i, c);
-          }
+                radiosity.cwiseProduct(weights).dot(problem_.shape[j].relative.row(block));
         if (gain_[k]) d[static_cast<Index>(*gain_[k])] = slope * light;
       }
       ++row;

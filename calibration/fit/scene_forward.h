@@ -14,6 +14,7 @@ struct SceneParameter {
   ParameterName name;
   double start = 0.0, low = 0.0, high = 0.0;
   double size = 1.0;  ///< a large change of it
+  std::string unit = {};
 };
 
 /// A row that ties parameters to what was known before: (sum k_i x_i - value) in units of u.
@@ -53,7 +54,11 @@ class SceneForward {
   void add_emissions();
   void add_gains();
   void add_response();
+  void add_gloss();
+  void add_shape();
   void start_gains();
+  void differentiate(const BlockRadiosity& b, Eigen::Index block, const Eigen::RowVectorXd& slopes,
+                     Eigen::Ref<Eigen::RowVectorXd> row) const;
 
   const SceneFitProblem& problem_;
   SceneState fixed_;
@@ -63,6 +68,8 @@ class SceneForward {
   std::vector<std::vector<std::size_t>> emission_;  // lamp -> parameter of each band; none if held
   std::vector<std::optional<std::size_t>> gain_;    // plane -> parameter
   std::vector<std::size_t> gamma_;
+  std::vector<std::optional<std::size_t>> gloss_;  // material -> parameter
+  std::vector<std::optional<std::size_t>> shape_;  // term -> parameter
   std::optional<ResponseCurve> curve_;
 };
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/scene_fit.h"
+#include "fit/scene_shape.h"
 #include "image/image.h"
 #include "readings/scene_measurement.h"
 
@@ -22,12 +22,14 @@ struct PlaneCounts {
 /// A measurement of a scene, read and set up: the problem and what is held out of it.
 struct SceneMeasurement {
   SceneMeasurementFile file;
-  std::unique_ptr<Scene> scene;
-  std::unique_ptr<SceneModel> model;
+  ShapedScene shaped;  ///< scene and model, where cameras and surfaces are now
   SceneFitProblem problem;
   std::vector<std::vector<BlockReading>> held_out;  ///< one a plane
   std::vector<PlaneCounts> counts;                  ///< one a plane
   std::vector<std::pair<int, int>> size_px;         ///< width and height of each plane
+
+  const Scene& scene() const { return *shaped.scene; }
+  const SceneModel& model() const { return *shaped.model; }
 };
 
 /// Reads scene, photographs, masks and curves; aggregates pixels into the means of what shows one
@@ -37,10 +39,11 @@ struct SceneMeasurement {
 /// for a photograph of another size than its camera's, or without the scene's bands.
 SceneMeasurement read_scene_fit(const SceneMeasurementFile& file, const Progress& progress = {});
 
-/// Fits; where the file asks for the prediction's bound, fits once more with it: at the fitted
-/// reflectances, per surface and plane, as a rectangular distribution (bound / sqrt 3) that all of
-/// its pixels share.
-SceneFit fit_measurement(SceneMeasurement& measurement, const SceneFitOptions& options,
+/// Fits; where cameras or surfaces moved by more than half a pixel, pixels are sorted into readings
+/// once more and fitted again. Where the file asks for the prediction's bound, fits once more with
+/// it: at the fitted reflectances, per surface and plane, as a rectangular distribution (bound /
+/// sqrt 3) that all of its pixels share.
+SceneFit fit_measurement(SceneMeasurement& measurement, const ShapeFitOptions& options,
                          const Progress& progress = {});
 
 /// Readings that were not fitted, as the fit predicts them; their u holds that of the reading, of

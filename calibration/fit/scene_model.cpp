@@ -3,11 +3,9 @@
 
 #include <algorithm>
 
-#include "fit/view_blocks.h"
 #include "mesh/patch_topology.h"
 #include "scene/requirements.h"
 #include "transport/direct_light.h"
-#include "transport/gather.h"
 #include "transport/sensitivity.h"
 
 namespace truebox {
@@ -58,120 +56,24 @@ SceneModel::SceneModel(const Scene& scene, const SceneModelOptions& options)
   factor_options.progress = options.progress;
   factors_ = form_factors(mesh_, lamp_scene_, Visibility(mesh_, lamp_scene_), factor_options);
   neighbours_ = edge_neighbours(mesh_, factors_.usable);
-  const Gather gather(mesh_, lamp_scene_, factor_options.occlusion);
-  direct_ = mean_direct(mesh_, lamp_scene_, gather, element_tree(mesh_),
-                        ShaftCulling(mesh_, lamp_scene_, factor_options.occlusion));
-}
-
-std::size_t SceneModel::add_view(const CameraDescription& camera) {
-  PixelBlockOptions how;
-  how.margin_px = options_.margin_px;
-  how.samples = options_.samples;
-  const PixelBlocks found = pixel_blocks(lamp_scene_, mesh_, factors_.usable, Camera(camera), how);
-  pixels_of_surface_.push_back(found.pixels_of_surface);
-  const Gather gather(mesh_, lamp_scene_, requirements(lamp_scene_).occlusion);
-  Gather::Scratch scratch;
-  Eigen::VectorXd at_point(direct_.cols());
-  for (const PixelBlock& pixels : found.blocks) {
-    ViewBlock block;
-    block.view = views() - 1;
-    block.element = pixels.element;
-    block.surface = mesh_.surface_of(mesh_.patches[pixels.element]);
-    block.pixels = pixels.pixels;
-    const Vec3& normal = mesh_.plane_of(mesh_.patches[pixels.element]).normal;
-    const auto n = static_cast<Index>(pixels.points.size());
-    BandMatrix light = BandMatrix::Zero(n, direct_.cols());
-    for (Index k = 0; k < n; ++k) {
-      at_point.setZero();
-      gather.add_direct(pixels.points[static_cast<std::size_t>(k)], normal, at_point, scratch);
-      light.row(k) = at_point.transpose();
-    }
-    block.direct = Eigen::VectorXd::Zero(direct_.cols());
-    for (Index l = 0; l < direct_.cols(); ++l)
-      block.direct[l] = mean_over_block(pixels, light.col(l)).value;
-    const SampledMean all = mean_over_block(pixels, light.rowwise().sum());
-    block.sampling_u = all.value > 0.0 ? all.standard_uncertainty / all.value : 0.0;
-    block.weights = plane_weights(block.element, pixels.centre);
-    blocks_.push_back(std::move(block));
-  }
-  return views() - 1;
-}
-
-std::size_t SceneModel::add_elements() {
-  pixels_of_surface_.emplace_back(scene_->surfaces.size(), 0);
-  for (std::uint32_t i = 0; i < mesh_.size(); ++i) {
-    const std::size_t s = mesh_.surface_of(mesh_.patches[i]);
-    if (!factors_.usable[i] || scene_->surfaces[s].is_opening ||
-        scene_->material_of(scene_->surfaces[s]).emits())
-      continue;
-    ++pixels_of_surface_.back()[s];
-    blocks_.push_back({.view = views() - 1,
-                       .element = i,
-                       .surface = s,
-                       .pixels = {},
-                       .direct = direct_.row(static_cast<Index>(i)).transpose(),
-                       .weights = {{i, 1.0}}});
-  }
-  return views() - 1;
-}
-
-std::size_t SceneModel::add_surface_means() {
-  pixels_of_surface_.emplace_back(scene_->surfaces.size(), 0);
-  for (std::size_t s = 0; s < scene_->surfaces.size(); ++s) {
-    ViewBlock block{.view = views() - 1,
-                    .element = 0,
-                    .surface = s,
-                    .pixels = {},
-                    .direct = Eigen::VectorXd::Zero(direct_.cols()),
-                    .weights = {}};
-    double area = 0.0;
-    for (std::uint32_t i = 0; i < mesh_.size(); ++i) {
-      if (!factors_.usable[i] || mesh_.surface_of(mesh_.patches[i]) != s) continue;
-      if (block.weights.empty()) block.element = i;
-      block.weights.emplace_back(i, mesh_.patches[i].area_m2);
-      block.direct += mesh_.patches[i].area_m2 * direct_.row(static_cast<Index>(i)).transpose();
-      area += mesh_.patches[i].area_m2;
-    }
-    if (scene_->surfaces[s].is_opening || area <= 0.0) continue;
-    for (auto& [element, weight] : block.weights) weight /= area;
-    block.direct /= area;
-    ++pixels_of_surface_.back()[s];
-    blocks_.push_back(std::move(block));
-  }
-  return views() - 1;
-}
-
-// I(x) = I_i + grad . (x - c_i), the gradient by least squares over the neighbours across an edge,
-// as in finite volumes: second order in the element size. Source: Barth (1991), AIAA 91-0278.
-std::vector<std::pair<std::uint32_t, double>> SceneModel::plane_weights(std::uint32_t element,
-                                                                        const Vec3& at) const {
-  const auto& around = neighbours_[element];
-  const Patch& patch = mesh_.patches[element];
-  const Vec3& normal = mesh_.plane_of(patch).normal;
-  const Vec3 axis_u = normal.unitOrthogonal(), axis_v = normal.cross(axis_u);
-  Eigen::MatrixX2d offsets(static_cast<Index>(around.size()), 2);
-  for (Index k = 0; k < offsets.rows(); ++k) {
-    const Vec3 d = mesh_.patches[around[static_cast<std::size_t>(k)]].centroid - patch.centroid;
-    offsets.row(k) << d.dot(axis_u), d.dot(axis_v);
-  }
-  std::vector<std::pair<std::uint32_t, double>> weights{{element, 1.0}};
-  const Eigen::Matrix2d normal_matrix = offsets.transpose() * offsets;
-  const double trace = normal_matrix.trace();
-  // Neighbours on one line give no gradient across it.
-  if (around.size() < 2 || normal_matrix.determinant() < 1e-3 * trace * trace) return weights;
-  const Eigen::Vector2d step((at - patch.centroid).dot(axis_u), (at - patch.centroid).dot(axis_v));
-  const Eigen::VectorXd share = offsets * normal_matrix.inverse() * step;
-  for (Index k = 0; k < share.size(); ++k) {
-    weights.emplace_back(around[static_cast<std::size_t>(k)], share[k]);
-    weights[0].second -= share[k];
-  }
-  return weights;
+  elements_of_corner_.resize(mesh_.vertices.size());
+  for (std::uint32_t i = 0; i < mesh_.size(); ++i)
+    if (factors_.usable[i])
+      for (const std::uint32_t corner : mesh_.corners_of(mesh_.patches[i]))
+        elements_of_corner_[corner].push_back(i);
+  gather_ = std::make_unique<Gather>(mesh_, lamp_scene_, factor_options.occlusion);
+  finder_ = std::make_unique<SmoothField>(mesh_, factors_.usable,
+                                          BandMatrix::Zero(static_cast<Index>(mesh_.size()), 1));
+  direct_ =
+      mean_direct(mesh_, lamp_scene_, *gather_, element_tree(mesh_),
+                  ShaftCulling(mesh_, lamp_scene_, factor_options.occlusion), options.progress);
 }
 
 SceneState SceneModel::state() const {
   const auto bands = static_cast<Index>(scene_->bands.size());
   SceneState state{BandMatrix(static_cast<Index>(scene_->materials.size()), bands),
-                   BandMatrix(static_cast<Index>(lamps_.size()), bands), true};
+                   BandMatrix(static_cast<Index>(lamps_.size()), bands),
+                   Eigen::VectorXd::Zero(static_cast<Index>(scene_->materials.size())), true};
   for (Index m = 0; m < state.reflectance.rows(); ++m)
     for (Index b = 0; b < bands; ++b)
       state.reflectance(m, b) =
@@ -192,85 +94,120 @@ BandMatrix SceneModel::element_reflectance(const SceneState& state) const {
   return rho;
 }
 
-BandMatrix SceneModel::at_blocks(const BandMatrix& elements) const {
-  BandMatrix all = BandMatrix::Zero(static_cast<Index>(blocks_.size()), elements.cols());
-  for (std::size_t i = 0; i < blocks_.size(); ++i)
-    for (const auto& [element, weight] : blocks_[i].weights)
-      all.row(static_cast<Index>(i)) += weight * elements.row(static_cast<Index>(element));
-  return all;
+namespace {
+
+/// Of what elements have, the mean over a part.
+Eigen::RowVectorXd at_part(const ViewPart& part, const BandMatrix& elements) {
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(elements.cols());
+  for (const auto& [element, weight] : part.weights)
+    sum += weight * elements.row(static_cast<Index>(element));
+  return sum;
 }
 
-BlockRadiosity SceneModel::radiosity(const SceneState& state,
-                                     const WantedDerivatives* wanted) const {
-  const auto n = static_cast<Index>(blocks_.size()), bands = state.reflectance.cols();
-  const auto lamps = static_cast<Index>(lamps_.size());
+}  // namespace
+
+ElementLight SceneModel::element_light(const SceneState& state) const {
   const DenseExchange exchange(factors_);
   const BandMatrix rho = element_reflectance(state);
   SolveOptions options;
   options.relative_bound = options_.solver_bound;
-
-  BlockRadiosity answer;
-  answer.outcome = SolveOutcome::converged;
-  const auto keep_worst = [&](const SolveSummary& summary) {
-    if (summary.outcome != SolveOutcome::converged) answer.outcome = summary.outcome;
-  };
-  const auto material_of = [&](std::size_t block) {
-    return static_cast<Index>(scene_->surfaces[blocks_[block].surface].material);
-  };
-  BandMatrix block_rho(n, bands);
-  for (Index i = 0; i < n; ++i)
-    block_rho.row(i) = state.reflectance.row(material_of(static_cast<std::size_t>(i)));
-
-  answer.value = BandMatrix::Zero(n, bands);
-  BandMatrix arriving = BandMatrix::Zero(n, bands);  // D + I of the blocks
-  BandMatrix direct = BandMatrix::Zero(rho.rows(), bands), indirect = direct;  // of the elements
-  for (Index l = 0; l < lamps; ++l) {
-    const BandMatrix unit_direct = direct_.col(l).replicate(1, bands);
-    BandMatrix reflected, unit_indirect = BandMatrix::Zero(rho.rows(), bands);
-    if (state.interreflection)
-      keep_worst(solve_radiosity(exchange, rho, rho.cwiseProduct(unit_direct), options, reflected,
-                                 {}, &unit_indirect));
-    BandMatrix received = at_blocks(unit_indirect);
-    BandMatrix by_exitance(n, bands);
-    for (Index i = 0; i < n; ++i) {
-      const ViewBlock& block = blocks_[static_cast<std::size_t>(i)];
-      received.row(i).array() += block.direct[l];
-      by_exitance.row(i) = block_rho.row(i).cwiseProduct(received.row(i));
-      if (static_cast<std::size_t>(material_of(static_cast<std::size_t>(i))) ==
-          lamps_[static_cast<std::size_t>(l)])
-        by_exitance.row(i).array() += 1.0;
+  ElementLight light;
+  light.outcome = SolveOutcome::converged;
+  for (Index l = 0; l < direct_.cols(); ++l) {
+    BandMatrix reflected, indirect = BandMatrix::Zero(rho.rows(), rho.cols());
+    if (state.interreflection && !lamps_.empty()) {
+      const BandMatrix direct = direct_.col(l).replicate(1, rho.cols());
+      const SolveSummary summary = solve_radiosity(exchange, rho, rho.cwiseProduct(direct), options,
+                                                   reflected, {}, &indirect);
+      if (summary.outcome != SolveOutcome::converged) light.outcome = summary.outcome;
     }
-    const auto spectrum = state.exitance.row(l).asDiagonal();
-    answer.value += by_exitance * spectrum;
-    arriving += received * spectrum;
-    direct += unit_direct * spectrum;
-    indirect += unit_indirect * spectrum;
+    light.indirect.push_back(std::move(indirect));
+  }
+  return light;
+}
+
+BlockRadiosity SceneModel::radiosity_of(const std::vector<ViewBlock>& blocks,
+                                        const SceneState& state, const ElementLight& light,
+                                        const WantedDerivatives* wanted) const {
+  const auto n = static_cast<Index>(blocks.size()), bands = state.reflectance.cols();
+  BlockRadiosity answer;
+  answer.outcome = light.outcome;
+  answer.value = BandMatrix::Zero(n, bands);
+  if (wanted && wanted->gloss)
+    answer.by_gloss.assign(scene_->materials.size(), BandMatrix::Zero(n, bands));
+  for (std::size_t l = 0; l < lamps_.size(); ++l) {
+    BandMatrix by_exitance = BandMatrix::Zero(n, bands);
+    const auto spectrum = state.exitance.row(static_cast<Index>(l));
+    for (Index i = 0; i < n; ++i)
+      for (const ViewPart& part : blocks[static_cast<std::size_t>(i)].parts) {
+        const auto material = static_cast<Index>(material_of(part));
+        Eigen::RowVectorXd sent = at_part(part, light.indirect[l]);
+        sent.array() += part.direct[static_cast<Index>(l)];
+        sent = state.reflectance.row(material).cwiseProduct(sent);
+        if (material_of(part) == lamps_[l]) sent.array() += 1.0;
+        if (part.gloss.size() > 0) {
+          const double seen = part.gloss[static_cast<Index>(l)];
+          sent.array() += state.gloss[material] * seen;
+          if (!answer.by_gloss.empty())
+            answer.by_gloss[material_of(part)].row(i) += part.share * seen * spectrum;
+        }
+        by_exitance.row(i) += part.share * sent;
+      }
+    answer.value += by_exitance * spectrum.asDiagonal();
     if (wanted && wanted->exitance) answer.by_exitance.push_back(std::move(by_exitance));
   }
-  if (!wanted) return answer;
+  return answer;
+}
 
-  const SolvedSystem system{exchange, rho, direct, indirect};
-  for (Index m = 0; m < state.reflectance.rows(); ++m) {
-    if (!wanted->reflectance[static_cast<std::size_t>(m)]) {
-      answer.by_reflectance.emplace_back();
-      continue;
-    }
-    BandMatrix by_rho = BandMatrix::Zero(n, bands);
-    if (state.interreflection && lamps > 0) {
-      std::vector<char> is_in_material(mesh_.size());
-      for (std::size_t i = 0; i < mesh_.size(); ++i)
-        is_in_material[i] =
-            static_cast<Index>(scene_->surfaces[mesh_.surface_of(mesh_.patches[i])].material) == m;
-      BandMatrix derivative;
-      keep_worst(reflectance_sensitivity(system, is_in_material, options, derivative));
-      const BandMatrix irradiance =
-          factors_.area_m2.cwiseInverse().asDiagonal() * exchange.product(derivative);
-      by_rho = block_rho.cwiseProduct(at_blocks(irradiance));
-    }
-    for (Index i = 0; i < n; ++i)
-      if (material_of(static_cast<std::size_t>(i)) == m) by_rho.row(i) += arriving.row(i);
-    answer.by_reflectance.push_back(std::move(by_rho));
+BandMatrix SceneModel::by_reflectance(std::size_t material, const SceneState& state,
+                                      const ElementLight& light, SolveOutcome& outcome) const {
+  const auto n = static_cast<Index>(blocks_.size()), bands = state.reflectance.cols();
+  BandMatrix by_rho = BandMatrix::Zero(n, bands);
+  BandMatrix direct = BandMatrix::Zero(static_cast<Index>(mesh_.size()), bands), indirect = direct;
+  BandMatrix irradiance;  // d I of the elements / d rho
+  for (std::size_t l = 0; l < lamps_.size(); ++l) {
+    const auto spectrum = state.exitance.row(static_cast<Index>(l));
+    direct += direct_.col(static_cast<Index>(l)) * spectrum;
+    indirect += light.indirect[l] * spectrum.asDiagonal();
   }
+  if (state.interreflection && !lamps_.empty()) {
+    const DenseExchange exchange(factors_);
+    const BandMatrix rho = element_reflectance(state);
+    std::vector<char> is_in_material(mesh_.size());
+    for (std::size_t i = 0; i < mesh_.size(); ++i)
+      is_in_material[i] = scene_->surfaces[mesh_.surface_of(mesh_.patches[i])].material == material;
+    SolveOptions options;
+    options.relative_bound = options_.solver_bound;
+    BandMatrix derivative;
+    const SolveSummary summary = reflectance_sensitivity({exchange, rho, direct, indirect},
+                                                         is_in_material, options, derivative);
+    if (summary.outcome != SolveOutcome::converged) outcome = summary.outcome;
+    irradiance = factors_.area_m2.cwiseInverse().asDiagonal() * exchange.product(derivative);
+  }
+  for (Index i = 0; i < n; ++i)
+    for (const ViewPart& part : blocks_[static_cast<std::size_t>(i)].parts) {
+      const std::size_t own = material_of(part);
+      if (irradiance.size() > 0)
+        by_rho.row(i) +=
+            part.share *
+            state.reflectance.row(static_cast<Index>(own)).cwiseProduct(at_part(part, irradiance));
+      if (own != material) continue;
+      by_rho.row(i) += part.share * at_part(part, indirect);
+      for (std::size_t l = 0; l < lamps_.size(); ++l)
+        by_rho.row(i) += part.share * part.direct[static_cast<Index>(l)] *
+                         state.exitance.row(static_cast<Index>(l));
+    }
+  return by_rho;
+}
+
+BlockRadiosity SceneModel::radiosity(const SceneState& state,
+                                     const WantedDerivatives* wanted) const {
+  const ElementLight light = element_light(state);
+  BlockRadiosity answer = radiosity_of(blocks_, state, light, wanted);
+  if (!wanted) return answer;
+  for (std::size_t m = 0; m < scene_->materials.size(); ++m)
+    answer.by_reflectance.push_back(
+        wanted->reflectance[m] ? by_reflectance(m, state, light, answer.outcome) : BandMatrix());
   return answer;
 }
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <tuple>
 
+#include "fit/scene_choices.h"
 #include "image/image_file.h"
 #include "image/spectral_image.h"
 #include "radiometry/input_error.h"
@@ -150,11 +151,11 @@ BlockSum sum_pixels(const ViewBlock& block, const PixelPlane& plane, const Photo
 void add_readings(SceneMeasurement& m, const PhotographSource& photo, std::size_t view,
                   const PixelPlane& pixels, PlaneReadings& plane, PlaneCounts& counts) {
   std::vector<BlockReading> held_out;
-  const auto& blocks = m.model->blocks();
+  const auto& blocks = m.model().blocks();
   std::size_t in_blocks = 0;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
-    if (blocks[i].view != view) continue;
-    const auto weight = m.file.surface_weights.find(m.scene->surfaces[blocks[i].surface].name);
+    if (blocks[i].view != view || blocks[i].parts.empty()) continue;
+    const auto weight = m.file.surface_weights.find(m.scene().surfaces[blocks[i].surface].name);
     const double w = weight == m.file.surface_weights.end() ? 1.0 : weight->second;
     if (!(w > 0.0)) continue;
     in_blocks += blocks[i].pixels.size();
@@ -163,7 +164,10 @@ void add_readings(SceneMeasurement& m, const PhotographSource& photo, std::size_
         static_cast<double>(sum.used) < kUsableShare * static_cast<double>(blocks[i].pixels.size()))
       continue;
     const double n = static_cast<double>(sum.used), value = sum.value / n;
-    const double own = photo.block_relative_u * value, sampling = blocks[i].sampling_u * value;
+    const double own = (blocks[i].is_mixed ? std::max(photo.edge_relative_u, photo.block_relative_u)
+                                           : photo.block_relative_u) *
+                       value;
+    const double sampling = blocks[i].sampling_u() * value;
     const double u = std::sqrt((sum.variance / (n * n) + own * own + sampling * sampling) / w);
     if (!(u > 0.0)) continue;
     const bool hold = lot(i) < m.file.held_out_share;
@@ -176,11 +180,46 @@ void add_readings(SceneMeasurement& m, const PhotographSource& photo, std::size_
 
 }  // namespace
 
+namespace {
+
+/// Views are shared by the planes of one camera, size and colour of photosites.
+class Views {
+ public:
+  explicit Views(SceneMeasurement& m) : m_(m) {
+    m.shaped.model->clear_views();
+    m.shaped.views.clear();
+  }
+
+  std::size_t of(const PhotographSource& photo, const CameraDescription& camera, char photosites) {
+    const auto key = std::make_tuple(photo.camera, camera.pixels[0], camera.pixels[1], photosites,
+                                     photosites ? photo.bayer->name() : std::string());
+    if (const auto known = known_.find(key); known != known_.end()) return known->second;
+    m_.shaped.views.push_back({photo.camera, camera.pixels});
+    std::function<bool(int, int)> uses;
+    if (photosites)
+      uses = [pattern = *photo.bayer, photosites](int x, int y) {
+        return pattern.site(x, y) == photosites;
+      };
+    const std::size_t view = m_.shaped.views.size() - 1;
+    return known_[key] = m_.shaped.model->add_view(m_.shaped.camera(m_.shaped.values, view), uses);
+  }
+
+ private:
+  SceneMeasurement& m_;
+  std::map<std::tuple<std::string, int, int, char, std::string>, std::size_t> known_;
+};
+
+}  // namespace
+
 void add_planes(SceneMeasurement& m, const Progress& progress) {
-  std::map<std::tuple<std::string, int, int>, std::size_t> views;
+  m.problem.planes.clear();
+  m.held_out.clear();
+  m.counts.clear();
+  m.size_px.clear();
+  Views views(m);
   for (const PhotographSource& photo : m.file.photographs) {
-    const auto named = m.scene->cameras.find(photo.camera);
-    if (named == m.scene->cameras.end())
+    const auto named = m.scene().cameras.find(photo.camera);
+    if (named == m.scene().cameras.end())
       throw InputError(m.file.path, photo.line, "a camera of the scene",
                        "\"" + photo.camera + "\"");
     if (progress) progress("reading " + photo.path, 0.0);
@@ -195,10 +234,8 @@ void add_planes(SceneMeasurement& m, const Progress& progress) {
     };
     const Image mask = beside(photo.mask_path), variance = beside(photo.variance_path),
                 standard_error = beside(photo.standard_error_path);
-    const auto key = std::make_tuple(photo.camera, image.width, image.height);
-    if (!views.contains(key)) views[key] = m.model->add_view(camera);
     const auto planes =
-        photo.planes.empty() ? spectral_planes(image, *m.scene, photo.path) : photo.planes;
+        photo.planes.empty() ? spectral_planes(image, m.scene(), photo.path) : photo.planes;
     for (const PlaneSource& source : planes) {
       PixelPlane pixels;
       pixels.value = &channel_of(image, source.channel, photo.path);
@@ -212,11 +249,9 @@ void add_planes(SceneMeasurement& m, const Progress& progress) {
       if (!photo.mask_path.empty()) pixels.mask = &mask.channels.front().samples;
       PlaneReadings plane;
       plane.name = source.name;
-      plane.view = views[key];
-      plane.band_weights = weights_of(source, *m.scene, m.file.path);
-      plane.gain = photo.gain.fit == "free"    ? Hold::free
-                   : photo.gain.fit == "prior" ? Hold::prior
-                                               : Hold::fixed;
+      plane.view = views.of(photo, camera, source.photosites);
+      plane.band_weights = weights_of(source, m.scene(), m.file.path);
+      plane.gain = hold_of(photo.gain.fit);
       plane.gain_value = photo.gain_value;
       plane.gain_relative_u = photo.gain.standard_uncertainty;
       PlaneCounts counts;

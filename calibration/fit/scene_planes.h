@@ -6,7 +6,8 @@
 
 namespace truebox {
 
-/// Adds the views, planes, readings and counts of every photograph of the measurement's file.
+/// Adds the views, planes, readings and counts of every photograph of the measurement's file, as
+/// its cameras and surfaces stand now. What was there before is replaced.
 void add_planes(SceneMeasurement& measurement, const Progress& progress);
 
 }  // namespace truebox

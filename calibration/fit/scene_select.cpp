@@ -53,6 +53,16 @@ SceneFitProblem with_one_reflectance(SceneFitProblem problem) {
   return problem;
 }
 
+/// As the problem has it, else free wherever the model knows a lobe.
+std::vector<GlossChoice> free_gloss(const SceneFitProblem& problem) {
+  std::vector<GlossChoice> gloss = problem.gloss;
+  gloss.resize(problem.model->scene().materials.size());
+  const auto& roughness = problem.model->options().roughness;
+  for (std::size_t m = 0; m < roughness.size(); ++m)
+    if (roughness[m] > 0.0 && gloss[m].hold == Hold::fixed) gloss[m].hold = Hold::free;
+  return gloss;
+}
+
 }  // namespace
 
 std::vector<ModelCandidate> select_model(const SceneFitProblem& problem,
@@ -60,16 +70,23 @@ std::vector<ModelCandidate> select_model(const SceneFitProblem& problem,
                                          const SceneFitOptions& options) {
   std::vector<Candidate> all;
   const bool has_bands = problem.model->scene().bands.size() > 1;
+  const auto& roughness = problem.model->options().roughness;
+  const bool has_gloss =
+      std::any_of(roughness.begin(), roughness.end(), [](double r) { return r > 0.0; });
   for (const bool each_band : {false, true}) {
     if (each_band && !has_bands) continue;
-    for (const bool interreflection : {false, true}) {
-      SceneFitProblem model = each_band || !has_bands ? problem : with_one_reflectance(problem);
-      model.interreflection = interreflection;
-      std::string name = interreflection ? "interreflection" : "direct light only";
-      if (has_bands)
-        name += each_band ? ", reflectances of each band" : ", one reflectance for all bands";
-      all.push_back(try_model(model, name, held_out, options));
-    }
+    for (const bool interreflection : {false, true})
+      for (const bool gloss : {false, true}) {
+        if (gloss && !has_gloss) continue;
+        SceneFitProblem model = each_band || !has_bands ? problem : with_one_reflectance(problem);
+        model.interreflection = interreflection;
+        model.gloss = gloss ? free_gloss(problem) : std::vector<GlossChoice>();
+        std::string name = interreflection ? "interreflection" : "direct light only";
+        if (gloss) name += " and gloss";
+        if (has_bands)
+          name += each_band ? ", reflectances of each band" : ", one reflectance for all bands";
+        all.push_back(try_model(model, name, held_out, options));
+      }
   }
   const double scale = std::pow(all.back().birge, 2), n = all.back().effective_readings;
   double best_bic = std::numeric_limits<double>::infinity(), best_rms = best_bic;

@@ -26,9 +26,10 @@ struct ModelCandidate {
 };
 
 /// Fits each model to the same readings and holds it against those held out, from the simplest to
-/// the richest: direct light or interreflection, one reflectance for all bands or one a band. The
-/// first one is chosen whose BIC is within 10 of the lowest and whose held-out rms is within 5 % of
-/// the lowest. Without readings held out BIC alone decides.
+/// the richest: direct light or interreflection, without or with gloss of the materials for which
+/// the model knows a lobe, one reflectance for all bands or one a band. The first one is chosen
+/// whose BIC is within 10 of the lowest and whose held-out rms is within 5 % of the lowest. Without
+/// readings held out BIC alone decides.
 std::vector<ModelCandidate> select_model(const SceneFitProblem& problem,
                                          const std::vector<std::vector<BlockReading>>& held_out,
                                          const SceneFitOptions& options);

@@ -131,6 +131,22 @@ std::vector<std::string> TomlTable::texts(const std::string& key) {
   return values;
 }
 
+std::vector<double> TomlTable::numbers(const std::string& key, std::size_t count) {
+  const toml::node* node = state_->find(key);
+  const std::string expected = "a list of " + std::to_string(count) + " numbers";
+  if (!node || !node->is_array() || node->as_array()->size() != count)
+    fail(key, expected, node ? described(*node) : "no such key");
+  std::vector<double> values;
+  for (const auto& item : *node->as_array()) {
+    const auto value = item.value<double>();
+    if (!value || !std::isfinite(*value))
+      throw InputError(state_->path.string(), line_of(item), key + " = " + expected,
+                       described(item));
+    values.push_back(*value);
+  }
+  return values;
+}
+
 std::vector<int> TomlTable::integers(const std::string& key, int low, int high) {
   const toml::node* node = state_->find(key);
   if (!node || !node->is_array() || node->as_array()->empty())

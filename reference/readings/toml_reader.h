@@ -30,6 +30,8 @@ class TomlTable {
   double number_or(const std::string& key, double fallback, double low, double high);
   int integer(const std::string& key, int low, int high);
   std::vector<std::string> texts(const std::string& key);
+  /// So many finite numbers.
+  std::vector<double> numbers(const std::string& key, std::size_t count);
   std::vector<int> integers(const std::string& key, int low, int high);
   TomlTable table(const std::string& key);
   std::vector<TomlTable> tables(const std::string& key);

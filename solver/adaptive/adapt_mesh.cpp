@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "adaptive/cell_errors.h"
+#include "discontinuity/discontinuity_mesh.h"
 
 namespace truebox {
 namespace {
@@ -29,14 +30,24 @@ Scene in_a_few_bands(const Scene& scene, const Requirements& needs) {
   return in_bands(scene, chosen);
 }
 
+CellTree first_cells(const Scene& scene, std::size_t count, bool discontinuities,
+                     FollowedLines& lines) {
+  if (!discontinuities) return CellTree(scene, edge_for_count(scene, count));
+  DiscontinuityOptions options;
+  options.cells = count;
+  return discontinuity_cells(scene, options, &lines);
+}
+
 }  // namespace
 
 AdaptedMesh adapt_mesh(const Scene& scene, const AdaptOptions& options) {
   const Requirements needs = requirements(scene);
   const Scene few = in_a_few_bands(scene, needs);
   const auto first = static_cast<std::size_t>(static_cast<double>(options.cells) / kFirstShare);
-  CellTree cells(scene, edge_for_count(scene, std::max<std::size_t>(1, first)));
-  AdaptedMesh result{cells, cells, {}};
+  FollowedLines lines;
+  CellTree cells =
+      first_cells(scene, std::max<std::size_t>(1, first), options.discontinuities, lines);
+  AdaptedMesh result{cells, cells, {}, lines};
   if (!needs.interreflection) return result;
   std::mt19937_64 random(options.seed);
   while (cells.size() < options.cells) {

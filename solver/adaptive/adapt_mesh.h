@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "adaptive/goal.h"
+#include "discontinuity/discontinuity_mesh.h"
 #include "mesh/cell_tree.h"
 #include "scene/requirements.h"
 #include "transport/form_factors.h"
@@ -15,6 +16,7 @@ struct AdaptOptions {
   std::size_t cells =
       400;  ///< when to stop; the finest grid of a prediction has four times as many
   Goal goal;
+  bool discontinuities = false;  ///< start from elements that follow lines of light and shadow
   FormFactorOptions form_factors;
   std::uint64_t seed = 1;  ///< of the goal's random signs
 };
@@ -30,6 +32,7 @@ struct AdaptedMesh {
   CellTree fine;    ///< `cells` of them
   CellTree coarse;  ///< about a quarter as many, an earlier state of the same mesh
   std::vector<AdaptStep> steps;
+  FollowedLines lines;  ///< that the first mesh follows, and so all
 };
 
 /// Starts from few cells and halves those, each in its better direction, where that lowers the

@@ -4,14 +4,17 @@
 namespace truebox {
 
 std::unique_ptr<Prediction> predict_adaptively(const Scene& scene, const PredictOptions& options,
-                                               const Goal& goal, std::vector<AdaptStep>* steps) {
+                                               const Goal& goal, AdaptReport* report,
+                                               bool discontinuities) {
   AdaptOptions adapt;
   adapt.cells = std::max<std::size_t>(1, options.elements / 4);
   adapt.goal = goal;
+  adapt.discontinuities = discontinuities;
   adapt.form_factors = options.form_factors;
   AdaptedMesh adapted = adapt_mesh(scene, adapt);
-  if (steps) *steps = adapted.steps;
+  if (report) *report = {adapted.steps, adapted.lines};
   PredictOptions on_adapted = options;
+  on_adapted.near_sources = false;  // cell errors are those of constant elements
   on_adapted.form_factors.method = FormFactorMethod::exact_visibility;
   on_adapted.mesh_of_grid = [&adapted](int grid) {
     return grid == 0 ? adapted.coarse.mesh(0) : adapted.fine.mesh(grid - 1);

@@ -9,6 +9,7 @@
 
 #include "transport/direct_light.h"
 #include "transport/gather.h"
+#include "transport/sensitivity.h"
 #include "transport/solve_radiosity.h"
 
 namespace truebox {
@@ -127,6 +128,29 @@ class Errors {
   const Eigen::VectorXd& field_weight_;
 };
 
+// dB / d ln rho of the goal's material, over each element's own rho; lamps are not observed.
+BandMatrix observed_sensitivity(const Quarters& q, const Scene& scene, const Goal& goal,
+                                const FormFactors& factors, const BandMatrix& rho,
+                                const BandMatrix& direct, const SolveOptions& options) {
+  const auto material_of = [&](std::size_t i) {
+    return scene.surfaces[q.mesh.surface_of(q.mesh.patches[i])].material;
+  };
+  std::vector<char> is_in_material(q.mesh.size());
+  for (std::size_t i = 0; i < q.mesh.size(); ++i)
+    is_in_material[i] = material_of(i) == goal.material;
+  const DenseExchange exchange(factors);
+  BandMatrix derivative;
+  reflectance_sensitivity({exchange, rho, direct, q.indirect}, is_in_material, options, derivative);
+  for (Index i = 0; i < derivative.rows(); ++i) {
+    const bool is_lamp = scene.materials[material_of(static_cast<std::size_t>(i))].emits();
+    for (Index b = 0; b < derivative.cols(); ++b)
+      derivative(i, b) = is_lamp || rho(i, b) <= 0.0 ? 0.0 : derivative(i, b) / rho(i, b);
+  }
+  const auto& reflectance = scene.materials[goal.material].reflectance.values;
+  return derivative *
+         Eigen::Map<const Eigen::VectorXd>(reflectance.data(), derivative.cols()).asDiagonal();
+}
+
 Quarters solve_quarters(const CellTree& cells, const Scene& scene, const Requirements& needs,
                         const Goal& goal, const FormFactorOptions& options,
                         std::mt19937_64& random) {
@@ -157,16 +181,20 @@ Quarters solve_quarters(const CellTree& cells, const Scene& scene, const Require
   for (std::size_t i = 0; i < q.mesh.size(); ++i)
     q.counts[i] &= !scene.surfaces[q.mesh.surface_of(q.mesh.patches[i])].is_opening;
   const SmoothField places(q.mesh, factors.usable, q.indirect);
+  BandMatrix sensitivity;
+  if (goal.kind == Goal::Kind::parameter)
+    sensitivity = observed_sensitivity(q, scene, goal, factors, rho, direct, solve);
   for (int d = 0; d < (goal.is_random() ? kDuals : 1); ++d) {
     BandMatrix psi;
-    solve_radiosity(factors, rho, dual_source(goal, q.mesh, q.counts, q.total, places, random),
+    solve_radiosity(factors, rho,
+                    dual_source(goal, q.mesh, q.counts, q.total, places, sensitivity, random),
                     solve, psi, {}, &q.dual.emplace_back());
   }
   return q;
 }
 
 // Of each quarter: its irradiance less what the smooth field of the cells' means says, relative.
-BandMatrix errors_between(const CellTree& cells, const Quarters& q) {
+BandMatrix errors_between(const CellTree& cells, const Quarters& q, const Goal& goal) {
   const PatchMesh mesh = cells.mesh(0);
   const auto n = static_cast<Index>(mesh.size());
   BandMatrix means = BandMatrix::Zero(n, q.indirect.cols());
@@ -200,7 +228,7 @@ BandMatrix errors_between(const CellTree& cells, const Quarters& q) {
       }
     }
   });
-  return error.cwiseProduct(inverse_irradiance(q.mesh, q.counts, q.total));
+  return error.cwiseProduct(inverse_irradiance(goal, q.mesh, q.counts, q.total));
 }
 
 }  // namespace
@@ -209,7 +237,7 @@ std::vector<CellError> cell_errors(const CellTree& cells, const Scene& scene,
                                    const Requirements& needs, const Goal& goal,
                                    const FormFactorOptions& options, std::mt19937_64& random) {
   const Quarters q = solve_quarters(cells, scene, needs, goal, options, random);
-  const BandMatrix field_error = errors_between(cells, q);
+  const BandMatrix field_error = errors_between(cells, q, goal);
   const SmoothField places(q.mesh, q.counts, q.indirect);
   const Eigen::VectorXd weight = field_weights(goal, q.mesh, q.counts, places);
   const Errors errors(cells, q, field_error, weight);

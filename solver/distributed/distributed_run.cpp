@@ -216,16 +216,17 @@ void DistributedRun::abort(int exit_code) {
 
 SolveGrid DistributedRun::solve_grid() {
   return [state = state_.get()](const GridTask& task, GridSolution& grid) {
-    const BandMatrix& rho = task.rho;
     const Partition partition(PETSC_COMM_WORLD, grid.mesh.size());
     const double start_s = MPI_Wtime();
     const DistributedRows rows(partition, grid.mesh, task.scene, task.form_factors);
     const double solve_start_s = MPI_Wtime();
     grid.usable = rows.usable();
     grid.form_factors = rows.summary();
-    grid.solve = {};
-    grid.solve.outcome = SolveOutcome::converged;
-    solve_bands(partition, rows, rho, task.source, task.solve, grid);
+    solve_with_near_sources(task, grid, [&](const BandMatrix& source, const SolveOptions& options) {
+      grid.solve = {};
+      grid.solve.outcome = SolveOutcome::converged;
+      solve_bands(partition, rows, task.rho, source, options, grid);
+    });
     state->times.form_factors_s += partition.max(solve_start_s - start_s);
     state->times.solve_s += partition.max(MPI_Wtime() - solve_start_s);
     state->times.rows_bytes = std::max(

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "mesh/hanging_vertices.h"
+
 namespace truebox {
 namespace {
 
@@ -14,28 +16,51 @@ struct CornerValue {
   VectorXd radiosity, error_bound;
 };
 
-// Values at the corners of all elements, in the order of mesh.corners.
-std::vector<CornerValue> corner_values(const Prediction& prediction) {
+constexpr std::uint32_t kCentre = 0xffffffffu;
+
+// Where an element's value is wanted: at its corners and at those of its neighbours that hang in
+// its edges, in order; then at its centre if any hang there, for triangles around it.
+struct Place {
+  std::uint32_t patch, vertex;  // into PatchMesh::vertices, or kCentre
+};
+
+std::vector<Place> places_of(const PatchMesh& mesh, const std::vector<char>& is_shown) {
+  std::vector<std::vector<HangingVertex>> hanging(mesh.size());
+  for (const HangingVertex& h : hanging_vertices(mesh)) hanging[h.patch].push_back(h);
+  std::vector<Place> places;
+  for (std::uint32_t i = 0; i < mesh.size(); ++i) {
+    if (!is_shown[i]) continue;
+    const auto corners = mesh.corners_of(mesh.patches[i]);
+    for (std::uint32_t k = 0; k < corners.size(); ++k) {
+      places.push_back({i, corners[k]});
+      for (const HangingVertex& h : hanging[i])
+        if (h.corner == k) places.push_back({i, h.vertex});
+    }
+    if (!hanging[i].empty()) places.push_back({i, kCentre});
+  }
+  return places;
+}
+
+Vec3 position_m(const PatchMesh& mesh, const Place& place) {
+  return place.vertex == kCentre ? mesh.patches[place.patch].centroid : mesh.vertices[place.vertex];
+}
+
+std::vector<CornerValue> values_at(const Prediction& prediction, const std::vector<Place>& places) {
   const PatchMesh& mesh = prediction.fine().mesh;
   const Scene& scene = prediction.scene();
   const auto bands = static_cast<Eigen::Index>(scene.bands.size());
-  std::vector<CornerValue> values(mesh.corners.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.size()), [&](const auto& range) {
+  std::vector<CornerValue> values(places.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, places.size()), [&](const auto& range) {
     Gather::Scratch scratch;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      const Patch& patch = mesh.patches[i];
-      const Surface& surface = scene.surfaces[mesh.surface_of(patch)];
-      if (surface.is_opening || !prediction.fine().usable[i]) continue;
-      const Material& material = scene.material_of(surface);
+      const Patch& patch = mesh.patches[places[i].patch];
+      const Material& material = scene.material_of(scene.surfaces[mesh.surface_of(patch)]);
       const Eigen::Map<const VectorXd> rho(material.reflectance.values.data(), bands);
       const Eigen::Map<const VectorXd> own(material.exitance.values.data(), bands);
-      for (std::uint32_t k = 0; k < patch.corner_count; ++k) {
-        const std::size_t c = patch.first_corner + k;
-        const Vec3& corner = mesh.vertices[mesh.corners[c]];
-        const BoundedIrradiance light = prediction.irradiance_on(
-            patch.piece, corner + 1e-3 * (patch.centroid - corner), scratch);
-        values[c] = {own + rho.cwiseProduct(light.value), rho.cwiseProduct(light.error_bound)};
-      }
+      const Vec3 x = position_m(mesh, places[i]);
+      const BoundedIrradiance light =
+          prediction.irradiance_on(patch.piece, x + 1e-3 * (patch.centroid - x), scratch);
+      values[i] = {own + rho.cwiseProduct(light.value), rho.cwiseProduct(light.error_bound)};
     }
   });
   return values;
@@ -52,44 +77,51 @@ bool continuous(const CornerValue& a, const CornerValue& b) {
 
 SolutionSurface solution_surface(const Prediction& prediction) {
   const PatchMesh& mesh = prediction.fine().mesh;
-  const std::vector<CornerValue> values = corner_values(prediction);
+  std::vector<char> is_shown = prediction.fine().usable;
+  for (std::size_t i = 0; i < mesh.size(); ++i)
+    is_shown[i] &= !prediction.scene().surfaces[mesh.surface_of(mesh.patches[i])].is_opening;
+  const std::vector<Place> places = places_of(mesh, is_shown);
+  const std::vector<CornerValue> values = values_at(prediction, places);
   SolutionSurface result;
   std::vector<std::vector<std::uint32_t>> vertices_at(mesh.vertices.size());
-  std::vector<std::size_t> corner_of;  // of each vertex, the corner whose value it carries
-  std::vector<std::uint32_t> outline;
-  for (std::size_t i = 0; i < mesh.size(); ++i) {
-    const Patch& patch = mesh.patches[i];
-    if (values[patch.first_corner].radiosity.size() == 0) continue;
-    outline.clear();
-    for (std::uint32_t k = 0; k < patch.corner_count; ++k) {
-      const std::size_t c = patch.first_corner + k;
-      auto& candidates = vertices_at[mesh.corners[c]];
+  std::vector<std::size_t> place_of;  // of each vertex, the place whose value it carries
+  const auto vertex_of = [&](std::size_t p) {
+    const auto added = static_cast<std::uint32_t>(place_of.size());
+    if (places[p].vertex != kCentre) {
+      auto& candidates = vertices_at[places[p].vertex];
       const auto shared = std::find_if(candidates.begin(), candidates.end(), [&](std::uint32_t v) {
-        return continuous(values[corner_of[v]], values[c]);
+        return continuous(values[place_of[v]], values[p]);
       });
-      if (shared != candidates.end()) {
-        outline.push_back(*shared);
-        continue;
-      }
-      outline.push_back(static_cast<std::uint32_t>(corner_of.size()));
-      candidates.push_back(outline.back());
-      corner_of.push_back(c);
-      result.positions_m.push_back(mesh.vertices[mesh.corners[c]]);
+      if (shared != candidates.end()) return *shared;
+      candidates.push_back(added);
     }
-    for (std::size_t k = 0; k < outline.size(); ++k) {
-      result.outlines.insert(result.outlines.end(),
-                             {outline[k], outline[(k + 1) % outline.size()]});
-      if (k < 2) continue;
-      result.triangles.insert(result.triangles.end(), {outline[0], outline[k - 1], outline[k]});
-      result.surface.push_back(static_cast<std::uint32_t>(mesh.surface_of(patch)));
+    place_of.push_back(p);
+    result.positions_m.push_back(position_m(mesh, places[p]));
+    return added;
+  };
+  std::vector<std::uint32_t> outline;
+  for (std::size_t p = 0; p < places.size();) {
+    const std::uint32_t patch = places[p].patch;
+    outline.clear();
+    std::uint32_t centre = kCentre;
+    for (; p < places.size() && places[p].patch == patch; ++p)
+      (places[p].vertex == kCentre ? centre : outline.emplace_back()) = vertex_of(p);
+    const std::size_t n = outline.size();
+    for (std::size_t k = 0; k < n; ++k) {
+      result.outlines.insert(result.outlines.end(), {outline[k], outline[(k + 1) % n]});
+      const bool in_fan = centre == kCentre && (k == 0 || k + 1 == n);
+      if (in_fan) continue;  // the edges at the fan's own corner have no triangle of their own
+      result.triangles.insert(result.triangles.end(), {centre == kCentre ? outline[0] : centre,
+                                                       outline[k], outline[(k + 1) % n]});
+      result.surface.push_back(static_cast<std::uint32_t>(mesh.surface_of(mesh.patches[patch])));
     }
   }
-  const auto rows = static_cast<Eigen::Index>(corner_of.size());
+  const auto rows = static_cast<Eigen::Index>(place_of.size());
   const auto bands = static_cast<Eigen::Index>(prediction.scene().bands.size());
   result.radiosity.resize(rows, bands);
   result.error_bound.resize(rows, bands);
   for (Eigen::Index v = 0; v < rows; ++v) {
-    const CornerValue& value = values[corner_of[static_cast<std::size_t>(v)]];
+    const CornerValue& value = values[place_of[static_cast<std::size_t>(v)]];
     result.radiosity.row(v) = value.radiosity.transpose();
     result.error_bound.row(v) = value.error_bound.transpose();
   }

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <iterator>
 #include <stdexcept>
+#include <tuple>
 
 #include "hierarchy/linked_exchange.h"
 #include "transport/enclosure.h"
@@ -15,14 +17,20 @@ namespace {
 
 using Eigen::Index;
 
-// Errors of links fall like the root of the error allowed to each (measured on three rooms).
 constexpr int kRounds = 4;
-constexpr double kLargestStep = 1.0 / 16, kSmallestStep = 1.0 / 3;  // of a link's error, each round
-constexpr double kLinksOfAnElement = 40.0;                    // at a tolerance of 1e-2, in rooms
-constexpr std::size_t kBytesOfAnElement = 2600;               // tree, points of groups, kernels
-constexpr std::size_t kBytesOfALink = sizeof(Link) * 2 + 16;  // while two lists and halves are held
-constexpr double kAccurateBelow = 4e-3;
-constexpr double kLeastRow = 0.1;  // rows that hold less than this are not scaled up to 1
+constexpr double kFirstShare = 0.1;  // of the tolerance: the first links are to be few
+constexpr double kFirstOrder = 0.6;  // what links leave out, by powers of what each may
+constexpr double kAim = 0.8;         // of the tolerance
+constexpr double kLargestStep = 1.0 / 256, kSmallestStep = 0.5;  // of a link's error, each round
+constexpr double kLinksOfAnElement = 40.0;                       // at a tolerance of 1e-2, in rooms
+constexpr std::size_t kBytesOfAnElement = 5200;                  // tree, points of groups, kernels
+constexpr std::size_t kBytesOfPoints = 2 * sizeof(GroupSamples) + 29 * 4 * sizeof(double);
+constexpr std::size_t kBytesOfALink = 40;
+constexpr std::size_t kCopies = 4;  // of links, at most: lists joined, those of elements kept
+constexpr double kMostKernelTolerance = 1e-2, kKernelShare = 0.03;  // of the links' tolerance
+constexpr double kStalled = 0.8;  // of the last estimate: what is left is between single elements
+constexpr double kCloseEnough = 0.02;  // of the tolerance, while rounds follow
+constexpr double kLeastRow = 0.1;      // rows that hold less than this are not scaled up to 1
 
 double processor_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -40,44 +48,61 @@ class Finder {
 
   FoundExchange find() {
     const double start_s = processor_s();
-    const ElementTree tree = usable_tree();
-    const LinkRefinement refinement(request_.mesh, request_.visibility, tree, request_.culling,
-                                    request_.options.seed);
+    const auto groups = std::make_shared<const GroupBasis>(request_.mesh, usable_tree());
+    const LinkRefinement refinement(
+        request_.mesh, request_.visibility, *groups, request_.culling,
+        std::min(kMostKernelTolerance, kKernelShare * options_.relative_tolerance),
+        request_.options.seed);
     // First links: light as if spread evenly. Each round knows the light that the last one found.
     const double tolerance = options_.relative_tolerance;
-    double of_a_link = tolerance * tolerance;
+    double of_a_link = kFirstShare * tolerance;
     BandMatrix radiosity = ambient_guess(), irradiance, last;
-    double worth = 1.0, last_estimate = 0.0;
-    Links links;
+    double worth = 1.0, last_estimate = 0.0, order = kFirstOrder;
+    LinkCounts counts;
+    std::vector<Link> known;
+    std::size_t total = 0;
+    double step = 1.0;
+    LinkedExchange* last_exchange = nullptr;
     test_enclosure();
     for (int round = 0; round < kRounds; ++round) {
-      links = refine(refinement, tree, radiosity, of_a_link);
-      auto exchange = std::make_unique<LinkedExchange>(tree, area_, links.links);
-      close(*exchange);
+      found_.exchange.reset();
+      Links links = refine(refinement, groups->tree, radiosity, of_a_link, known);
+      counts = links.counts;
+      total = links.size();
+      std::vector<Link> of_elements = links_of_elements(groups->tree, links);
+      auto exchange = std::make_unique<LinkedExchange>(groups, area_, std::move(links));
+      close(*exchange, groups->bytes(), kCloseEnough * tolerance);
       radiosity = solved(*exchange, irradiance);
+      last_exchange = exchange.get();
       found_.exchange = std::move(exchange);
-      const double estimate = std::sqrt(links.sum_of_squares);
-      if (last_estimate > 0.0) worth = relative_difference(last, irradiance) / last_estimate;
-      worth = std::max(1.0, worth);
-      if (round > 0 && worth * estimate <= tolerance) break;
+      const double estimate = std::sqrt(counts.sum_of_squares);
+      if (last_estimate > 0.0)
+        worth = std::max(1.0, relative_difference(last, irradiance) / last_estimate);
+      if (round > 0 && (worth * estimate <= tolerance || estimate > kStalled * last_estimate))
+        break;
+      if (last_estimate > estimate && estimate > 0.0)
+        order = std::clamp(std::log(last_estimate / estimate) / std::log(1.0 / step), 0.4, 1.0);
       last = irradiance;
       last_estimate = estimate;
-      const double step = estimate > 0.0 ? std::pow(tolerance / (worth * estimate), 2) : 1.0;
-      of_a_link *= std::clamp(step, kLargestStep, kSmallestStep);
+      known = std::move(of_elements);
+      const double wanted = estimate > 0.0 ? kAim * tolerance / (worth * estimate) : 1.0;
+      step = std::clamp(std::pow(wanted, 1.0 / order), kLargestStep, kSmallestStep);
+      of_a_link *= step;
     }
+    finish_closing(*last_exchange);
     FormFactorSummary& summary = found_.summary;
-    summary.rays = links.rays;
-    summary.pairs_hidden = links.hidden;
-    summary.pairs_sampled = links.sampled;
-    summary.pairs_unoccluded = links.links.size() - std::min(links.links.size(), links.sampled);
+    summary.rays = counts.rays;
+    summary.pairs_hidden = counts.hidden;
+    summary.pairs_sampled = counts.sampled;
+    summary.pairs_unoccluded = total - std::min(total, counts.sampled);
     found_.links = LinkSummary{request_.mesh.size(),
-                               links.links.size(),
-                               links.tried,
-                               links.hidden,
+                               total,
+                               counts.tried,
+                               counts.hidden,
                                bytes_,
                                processor_s() - start_s,
                                tolerance,
-                               worth * std::sqrt(links.sum_of_squares)};
+                               worth * std::sqrt(counts.sum_of_squares)};
     return std::move(found_);
   }
 
@@ -103,20 +128,19 @@ class Finder {
   }
 
   Links refine(const LinkRefinement& refinement, const ElementTree& tree,
-               const BandMatrix& radiosity, double of_a_link) const {
+               const BandMatrix& radiosity, double of_a_link, std::span<const Link> known) const {
     LinkOptions options;
     options.error_of_a_link = of_a_link;
     options.rays = request_.options.rays;
-    options.accurate_elements = options_.relative_tolerance < kAccurateBelow;
+    options.most_degree = options_.most_degree;
     options.seed = request_.options.seed;
     options.progress = request_.options.progress;
     const std::size_t others = request_.mesh.size() * kBytesOfAnElement;
-    options.most_links =
-        (options_.memory_limit_bytes - std::min(options_.memory_limit_bytes, others)) /
-        kBytesOfALink;
+    options.most_bytes =
+        (options_.memory_limit_bytes - std::min(options_.memory_limit_bytes, others)) / kCopies;
     const Eigen::VectorXd mean = (area_.transpose() * radiosity / area_.sum()).transpose();
     try {
-      return refinement.refine(node_light(tree, area_, radiosity, mean), options);
+      return refinement.refine(node_light(tree, area_, radiosity, mean), options, known);
     } catch (const std::length_error& error) {
       throw std::length_error(
           std::to_string(request_.mesh.size()) + " elements with a link tolerance of " +
@@ -124,6 +148,18 @@ class Finder {
           ", which is all " + mebibytes(static_cast<double>(options_.memory_limit_bytes)) +
           " hold; a tolerance twice as large takes about a third of the links");
     }
+  }
+
+  // Sorted, as the next refinement wants them.
+  static std::vector<Link> links_of_elements(const ElementTree& tree, const Links& links) {
+    std::vector<Link> found;
+    std::copy_if(links.links.begin(), links.links.end(), std::back_inserter(found),
+                 [&](const Link& link) {
+                   return tree.nodes[link.a].is_leaf() && tree.nodes[link.b].is_leaf();
+                 });
+    std::sort(found.begin(), found.end(),
+              [](const Link& x, const Link& y) { return std::tie(x.a, x.b) < std::tie(y.a, y.b); });
+    return found;
   }
 
   BandMatrix solved(const ExchangeOperator& exchange, BandMatrix& irradiance) const {
@@ -155,9 +191,9 @@ class Finder {
   }
 
   // Rows that sum to 1 in a closed scene, to no more than 1 in an open one.
-  void close(LinkedExchange& exchange) {
+  void close(LinkedExchange& exchange, std::size_t bytes_of_groups, double accuracy) {
     FormFactorSummary& summary = found_.summary;
-    bytes_ = exchange.bytes() + request_.mesh.size() * kBytesOfAnElement;
+    bytes_ = exchange.bytes() + bytes_of_groups + request_.mesh.size() * kBytesOfPoints;
     const Eigen::VectorXd rows = exchange.row_sums();
     double weighted = 0.0, total = 0.0;
     summary.closure_error_max = 0.0;
@@ -169,8 +205,14 @@ class Finder {
       total += area_[i];
     }
     summary.closure_error_mean = weighted / total;
-    const auto repair = exchange.close_rows(kLeastRow, summary.closed);
+    const auto repair = exchange.close_rows(kLeastRow, summary.closed, accuracy);
     summary.repair_max = repair.largest_change;
+  }
+
+  // To the last digit, where the links are the last.
+  void finish_closing(LinkedExchange& exchange) {
+    FormFactorSummary& summary = found_.summary;
+    const auto repair = exchange.close_rows(kLeastRow, summary.closed);
     summary.closure_residual_max = repair.residual_max;
     summary.row_sum_max = exchange.row_sum_max();
   }

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "hierarchy/group_basis.h"
 #include "transport/found_exchange.h"
 
 namespace truebox {
@@ -12,6 +13,7 @@ struct HierarchyOptions {
   /// relative to its mean, worst band: an aim, met as far as the elements allow.
   double relative_tolerance = 1e-2;
   std::size_t memory_limit_bytes = std::size_t{4} << 30;
+  int most_degree = kMaxLinkDegree;  ///< of the kernel between flat groups; 0: constants alone
 
   std::string invalid() const;  ///< why these options cannot be used; empty if they can
 };

@@ -9,19 +9,23 @@
 #include <cmath>
 #include <deque>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
+#include <tuple>
 
-#include "hierarchy/group_kernel.h"
+#include "hierarchy/kernel_fit.h"
 #include "transport/enclosure.h"
-#include "transport/pair_kernel.h"
 
 namespace truebox {
 namespace {
 
-constexpr double kFarEnough = 0.5;  // gap over radius from which 16 x 16 points see the kernel
-constexpr double kElementTolerance = 1e-4;
+constexpr double kFarEnough = 0.5;   // gap over radius from which 16 x 16 points see the kernel
 constexpr std::size_t kTasks = 256;  // each starts from all blockers again
 constexpr int kFirstRays = 8;
+constexpr std::size_t kMostOutlines = 12;  // blockers: beyond, rays are faster
+constexpr double kLeastShadow = 0.03;      // deviation of the visible share where there is an edge
+constexpr double kMissed = 0.2;            // of a partly hidden element, if one point looks
+constexpr double kFilled = 1e-6;           // of a group's area, that its rectangle may exceed it by
 
 double gap_m(const ElementNode& a, const ElementNode& b) { return a.box.exteriorDistance(b.box); }
 
@@ -61,8 +65,9 @@ NodeLight node_light(const ElementTree& tree, const Eigen::VectorXd& area_m2,
 // Walks down pairs of nodes; blockers that are still in question are on a stack.
 class LinkRefinement::Walk {
  public:
-  Walk(const LinkRefinement& parent, const NodeLight& light, const LinkOptions& options)
-      : parent_(parent), light_(light), options_(options) {}
+  Walk(const LinkRefinement& parent, const NodeLight& light, const LinkOptions& options,
+       std::span<const Link> known)
+      : parent_(parent), light_(light), options_(options), known_(known) {}
 
   Links found;
 
@@ -79,9 +84,11 @@ class LinkRefinement::Walk {
   }
 
  private:
+  // Kernel-weighted visible share of two groups, its deviation over all pairs of points and over
+  // the points of either, each averaged over the other.
   struct Visible {
-    double share = 1.0;  // kernel-weighted
-    double spread = 0.0;
+    double share = 1.0;
+    double spread = 0.0, spread_a = 0.0, spread_b = 0.0;
   };
 
   const ElementNode& node(std::uint32_t k) const { return parent_.tree_.nodes[k]; }
@@ -106,13 +113,13 @@ class LinkRefinement::Walk {
     const double tolerance_m = parent_.culling_.tolerance_m();
     const ShaftEnd end_a = a.end_of_shaft(), end_b = b.end_of_shaft();
     if (end_a.is_behind(b.horizon, tolerance_m) || end_b.is_behind(a.horizon, tolerance_m)) return;
-    ++found.tried;
+    ++found.counts.tried;
     const std::size_t to = stack_.size();
     if (!parent_.culling_.keep_between(end_a, end_b, stack_, from, to))
-      ++found.hidden;
+      ++found.counts.hidden;
     else if (a.is_leaf() && b.is_leaf())
-      link_elements(pair, stack_.size() > to);
-    else if (!link_groups(pair, stack_.size() > to))
+      link_elements(pair, to);
+    else if (!link_groups(pair, to))
       divide(pair, to);
     stack_.resize(to);
   }
@@ -152,50 +159,142 @@ class LinkRefinement::Walk {
       ++cast;
       if (!parent_.visibility_.occluded(x, nx, y, ny)) seen += weight;
     }
-    found.rays += static_cast<std::size_t>(cast);
-    if (total == 0.0) return {0.0, 0.0};
+    found.counts.rays += static_cast<std::size_t>(cast);
+    if (total == 0.0) return {0.0, 0.0, 0.0, 0.0};
     const double share = seen / total;
     // Rays that all agree may still have missed something: one more might not.
-    return {share, std::max(std::sqrt(share * (1.0 - share)), 0.5 / (cast + 1))};
+    const double spread = std::max(std::sqrt(share * (1.0 - share)), 0.5 / (cast + 1));
+    return {share, spread, spread, spread};
   }
 
-  // From the points of an element to a whole other one.
-  double mean_factor(std::uint32_t from, const PlanarPolygon& to) const {
-    const GroupSamples& samples = parent_.samples_[from];
-    double factor = 0.0;
-    for (int k = 0; k < kGroupSamples; ++k) {
-      const Vec3 point = samples.point(node(from), k);
-      if (to.plane.distance_m(point) > 0.0)
-        factor += samples.weight[k] * point_to_polygon(point, node(from).normal, to.vertices);
+  // The outline that a group fills; false if it fills none.
+  bool outline_of(std::uint32_t k, Polygon& outline) const {
+    if (node(k).is_leaf()) {
+      outline = parent_.polygons_[parent_.tree_.order[node(k).begin]].vertices;
+      return true;
     }
-    return factor;
+    const GroupFrame& f = parent_.basis_.frames[k];
+    if (!f.is_flat || std::abs(4.0 * f.half_u.norm() * f.half_v.norm() - node(k).area_m2) >
+                          kFilled * node(k).area_m2)
+      return false;
+    outline = {f.centre - f.half_u - f.half_v, f.centre + f.half_u - f.half_v,
+               f.centre + f.half_u + f.half_v, f.centre - f.half_u + f.half_v};
+    return true;
   }
 
-  void link_elements(Pair pair, bool may_be_hidden) {
+  // Gauss points of an element, or of the rectangle that a group fills, with weights.
+  struct WeightedPoint {
+    Vec3 at;
+    double weight;
+  };
+  void find_points(std::uint32_t k) {
+    points_.clear();
+    if (node(k).is_leaf() && order_ == 1) {
+      points_.push_back({node(k).centre, 1.0});
+      return;
+    }
+    if (node(k).is_leaf()) {
+      const auto p = parent_.kernel_.points(parent_.tree_.order[node(k).begin], order_);
+      for (std::uint32_t q = 0; q < p.count; ++q)
+        points_.push_back({{p.x[q], p.y[q], p.z[q]}, p.weight_m2[q]});
+      return;
+    }
+    const double at = 1.0 / std::sqrt(3.0);  // 2 x 2 points give the variance of a linear share
+    const GroupFrame& f = parent_.basis_.frames[k];
+    for (double s : {-at, at})
+      for (double t : {-at, at}) points_.push_back({f.centre + s * f.half_u + t * f.half_v, 1.0});
+  }
+
+  // What points of one group see of the other's outline: the mean share and its deviation.
+  std::pair<double, double> share_seen(std::uint32_t receiver, std::uint32_t source,
+                                       const Polygon& outline) {
+    const Vec3& normal = node(receiver).normal;
+    const Plane plane{node(source).normal, node(source).normal.dot(outline[0])};
+    double seen = 0.0, all = 0.0, squares = 0.0;
+    find_points(receiver);
+    for (const WeightedPoint& x : points_) {
+      if (plane.distance_m(x.at) <= 0.0) continue;
+      const double whole = point_to_polygon(x.at, normal, outline);
+      if (whole <= 0.0) continue;
+      double part = 0.0;
+      for (const Polygon& visible : parts_(x.at, outline, plane, between_))
+        part += point_to_polygon(x.at, normal, visible);
+      seen += x.weight * part;
+      all += x.weight * whole;
+      squares += x.weight * part * part / whole;
+    }
+    if (all <= 0.0) return {0.0, 0.0};
+    const double share = std::min(1.0, seen / all);
+    return {share, std::sqrt(std::max(0.0, squares / all - share * share))};
+  }
+
+  // By outlines of the shadows; nothing if there are too many, or no outlines. Elements need one
+  // direction only: the smaller one looks.
+  std::optional<Visible> outlined_share(Pair pair, std::size_t from) {
+    if (stack_.size() - from > kMostOutlines || !outline_of(pair.a, outline_a_) ||
+        !outline_of(pair.b, outline_b_))
+      return std::nullopt;
+    between_.clear();
+    for (std::size_t k = from; k < stack_.size(); ++k)
+      between_.push_back(&parent_.blockers_[stack_[k]]);
+    ++found.counts.outlined;
+    if (node(pair.a).is_leaf() && node(pair.b).is_leaf()) {
+      const bool a_looks = node(pair.a).radius_m <= node(pair.b).radius_m;
+      const auto [share, spread] =
+          a_looks ? share_seen(pair.a, pair.b, outline_b_) : share_seen(pair.b, pair.a, outline_a_);
+      // One point cannot tell how the share varies; n x n points miss an edge by 1/n of that.
+      const double alone = share > 0.0 && share < 1.0 ? kMissed : 0.5 * kMissed;
+      const double deviation = order_ == 1 ? alone : spread / order_;
+      return Visible{share, deviation, deviation, deviation};
+    }
+    const auto [share_a, spread_a] = share_seen(pair.a, pair.b, outline_b_);
+    const auto [share_b, spread_b] = share_seen(pair.b, pair.a, outline_a_);
+    const double share = 0.5 * (share_a + share_b), doubt = 0.5 * std::abs(share_a - share_b);
+    return Visible{share, std::sqrt(share * (1.0 - share)), std::hypot(spread_a, doubt),
+                   std::hypot(spread_b, doubt)};
+  }
+
+  Visible visible(Pair pair, std::size_t from, int rays) {
+    const std::optional<Visible> outlined = outlined_share(pair, from);
+    return outlined ? *outlined : visible_share(pair, rays);
+  }
+
+  void link_elements(Pair pair, std::size_t from) {
     const std::uint32_t i = parent_.tree_.order[node(pair.a).begin];
     const std::uint32_t j = parent_.tree_.order[node(pair.b).begin];
-    Visible visible;
-    if (may_be_hidden) {
-      visible = visible_share(pair, options_.rays);
-      if (visible.share == 0.0) return;
-      ++found.sampled;
+    if (const Link* link = known_link(pair)) {
+      add(*link);
+      return;
     }
-    // Near ones by Lambert's formula from points of the smaller; from a gap on, points alone.
-    const ElementNode &a = node(pair.a), &b = node(pair.b);
-    const bool is_near = gap_m(a, b) < kFarEnough * std::max(a.radius_m, b.radius_m);
-    double kernel_per_m2 = 0.0;
-    if (!is_near)
-      kernel_per_m2 =
-          kernel_statistics(parent_.samples_[pair.a], parent_.samples_[pair.b], b.centre - a.centre)
-              .mean;
-    else if (options_.accurate_elements)
-      kernel_per_m2 =
-          exchange_area_m2(parent_.polygons_[i], parent_.polygons_[j], kElementTolerance) /
-          (a.area_m2 * b.area_m2);
-    else
-      kernel_per_m2 = a.area_m2 < b.area_m2 ? mean_factor(pair.a, parent_.polygons_[j]) / b.area_m2
-                                            : mean_factor(pair.b, parent_.polygons_[i]) / a.area_m2;
-    if (kernel_per_m2 > 0.0) add(pair, visible.share * kernel_per_m2);
+    const double kernel_per_m2 =
+        parent_.kernel_.exchange_area_m2(i, j) / (node(pair.a).area_m2 * node(pair.b).area_m2);
+    Link link{pair.a, pair.b, static_cast<float>(kernel_per_m2)};
+    if (stack_.size() > from && kernel_per_m2 > 0.0) {
+      order_ = 1;
+      while (order_ < 3 && !is_tolerable(pair, uncertain(kernel_per_m2, kMissed / order_)))
+        ++order_;
+      const Visible seen = visible(pair, from, options_.rays);
+      link.kernel_per_m2 *= static_cast<float>(seen.share);
+      link.deviation_per_m2 = static_cast<float>(seen.spread * kernel_per_m2);
+      ++found.counts.sampled;
+    }
+    if (link.kernel_per_m2 > 0.0f) add(link);
+  }
+
+  // One found before that is good enough now, or null.
+  const Link* known_link(Pair pair) const {
+    const auto at =
+        std::lower_bound(known_.begin(), known_.end(), pair, [](const Link& link, const Pair& p) {
+          return std::tie(link.a, link.b) < std::tie(p.a, p.b);
+        });
+    if (at == known_.end() || at->a != pair.a || at->b != pair.b) return nullptr;
+    const double deviation = static_cast<double>(at->deviation_per_m2);
+    return deviation == 0.0 || is_tolerable(pair, uncertain(deviation, 1.0)) ? &*at : nullptr;
+  }
+
+  static KernelStatistics uncertain(double kernel_per_m2, double share) {
+    const double deviation = share * kernel_per_m2;
+    return {kernel_per_m2, deviation, deviation, deviation};
   }
 
   // What one side gets wrong, relative to the mean irradiance, times the root of its area share.
@@ -206,64 +305,158 @@ class LinkRefinement::Walk {
            std::sqrt(node(receiver).area_m2 / node(0).area_m2);
   }
 
-  bool link_groups(Pair pair, bool may_be_hidden) {
+  struct Errors {
+    double of_a, of_b;
+    double larger() const { return std::max(of_a, of_b); }
+  };
+  Errors errors(Pair pair, const KernelStatistics& left_out) const {
+    return {error(pair.a, pair.b, left_out.spread_a, left_out.spread),
+            error(pair.b, pair.a, left_out.spread_b, left_out.spread)};
+  }
+
+  bool is_tolerable(Pair pair, const KernelStatistics& left_out) const {
+    return errors(pair, left_out).larger() <= options_.error_of_a_link;
+  }
+
+  // The kernel between two groups as a polynomial.
+  struct Polynomial {
+    int degree = 0;
+    double damping = 1.0;
+    KernelFit fit;
+  };
+
+  // The lowest degree that leaves out little enough, with what it does leave out in `kernel`.
+  bool find_degree(Pair pair, KernelStatistics& kernel, Polynomial& found_degree) const {
+    const GroupFrame &a = parent_.basis_.frames[pair.a], &b = parent_.basis_.frames[pair.b];
+    if (!a.is_flat || !b.is_flat) return false;
+    found_degree.fit = fit_kernel(a, node(pair.a).normal, b, node(pair.b).normal);
+    const auto& of_degree = found_degree.fit.of_degree;
+    for (int d = 1; d <= options_.most_degree; ++d) {
+      kernel = of_degree[static_cast<std::size_t>(d)];
+      if (!is_tolerable(pair, kernel)) continue;
+      const double damping = found_degree.fit.damping(d), gone = 1.0 - damping;
+      kernel.spread = std::hypot(kernel.spread, gone * of_degree[0].spread);
+      kernel.spread_a = std::hypot(kernel.spread_a, gone * of_degree[0].spread_a);
+      kernel.spread_b = std::hypot(kernel.spread_b, gone * of_degree[0].spread_b);
+      if (!is_tolerable(pair, kernel)) continue;
+      found_degree.degree = d;
+      found_degree.damping = damping;
+      return true;
+    }
+    return false;
+  }
+
+  bool link_groups(Pair pair, std::size_t from) {
     const ElementNode &a = node(pair.a), &b = node(pair.b);
+    const bool is_near = gap_m(a, b) < kFarEnough * std::max(a.radius_m, b.radius_m);
     KernelStatistics kernel =
         kernel_statistics(parent_.samples_[pair.a], parent_.samples_[pair.b], b.centre - a.centre);
     // Too near for the points: the exchange is at most the smaller area, and may be all of it.
-    const double most = 1.0 / std::max(a.area_m2, b.area_m2);
-    if (gap_m(a, b) < kFarEnough * std::max(a.radius_m, b.radius_m)) {
+    if (is_near) {
+      const double most = 1.0 / std::max(a.area_m2, b.area_m2);
       kernel.mean = std::min(kernel.mean, most);
       kernel.spread = kernel.spread_a = kernel.spread_b = 0.5 * most;
     }
-    const double limit = options_.error_of_a_link;
-    const auto errors = [&] {
-      return std::pair(error(pair.a, pair.b, kernel.spread_a, kernel.spread),
-                       error(pair.b, pair.a, kernel.spread_b, kernel.spread));
-    };
-    auto [error_a, error_b] = errors();
-    if (std::max(error_a, error_b) > limit) return false;
+    Polynomial polynomial;
+    if (!is_tolerable(pair, kernel) && (is_near || !find_degree(pair, kernel, polynomial)))
+      return false;
     if (kernel.mean == 0.0) return true;
-    if (may_be_hidden) {
-      const Visible visible = visible_share(pair, kGroupSamples);
-      const double by_visibility = visible.spread * kernel.mean;
-      kernel.mean *= visible.share;
-      kernel.spread = std::hypot(kernel.spread, by_visibility);
-      kernel.spread_a = std::hypot(kernel.spread_a, by_visibility);
-      kernel.spread_b = std::hypot(kernel.spread_b, by_visibility);
-      std::tie(error_a, error_b) = errors();
-      if (std::max(error_a, error_b) > limit) return false;
-      ++found.sampled;
+    double share = 1.0;
+    if (stack_.size() > from) {
+      // No shadow's edge leaves less than this; most leave more, and then the work was for nothing.
+      if (!is_tolerable(pair, with_shadow(kernel, {1.0, kLeastShadow, kLeastShadow, kLeastShadow})))
+        return false;
+      order_ = 2;
+      const Visible seen = visible(pair, from, kGroupSamples);
+      kernel = with_shadow(kernel, seen);
+      if (!is_tolerable(pair, kernel)) return false;
+      share = seen.share;
+      ++found.counts.sampled;
     }
-    found.sum_of_squares += error_a * error_a + error_b * error_b;
-    if (kernel.mean > 0.0) add(pair, kernel.mean);
+    count_error(pair, kernel);
+    if (share > 0.0 && polynomial.degree == 0)
+      add({pair.a, pair.b, static_cast<float>(share * kernel.mean)});
+    else if (share > 0.0)
+      add(pair, share, polynomial);
     return true;
   }
 
-  void add(Pair pair, double kernel_per_m2) {
-    found.links.push_back({pair.a, pair.b, static_cast<float>(kernel_per_m2)});
+  static KernelStatistics with_shadow(const KernelStatistics& kernel, const Visible& visible) {
+    return {kernel.mean, std::hypot(kernel.spread, visible.spread * kernel.mean),
+            std::hypot(kernel.spread_a, visible.spread_a * kernel.mean),
+            std::hypot(kernel.spread_b, visible.spread_b * kernel.mean)};
+  }
+
+  void add(const Link& link) {
+    found.links.push_back(link);
+    if (link.deviation_per_m2 > 0.0f)
+      count_error({link.a, link.b}, uncertain(static_cast<double>(link.deviation_per_m2), 1.0));
+  }
+
+  void count_error(Pair pair, const KernelStatistics& left_out) {
+    const Errors error = errors(pair, left_out);
+    found.counts.sum_of_squares += error.of_a * error.of_a + error.of_b * error.of_b;
+  }
+
+  void add(Pair pair, double share, const Polynomial& polynomial) {
+    const int n = terms_of(polynomial.degree);
+    found.polynomial.push_back({pair.a, pair.b, static_cast<std::uint32_t>(polynomial.degree),
+                                found.coefficients_per_m2.size()});
+    const auto rest = static_cast<float>(share * polynomial.damping);
+    for (int k = 0; k < n; ++k)
+      for (int l = 0; l < n; ++l)
+        found.coefficients_per_m2.push_back((k + l == 0 ? static_cast<float>(share) : rest) *
+                                            polynomial.fit.coefficient_per_m2[k][l]);
   }
 
   const LinkRefinement& parent_;
   const NodeLight& light_;
   const LinkOptions& options_;
+  std::span<const Link> known_;
   std::vector<std::uint32_t> stack_;
   std::deque<Pair>* queue_ = nullptr;
+  VisibleParts parts_;
+  Polygon outline_a_, outline_b_;
+  std::vector<const Blocker*> between_;
+  std::vector<WeightedPoint> points_;
+  int order_ = 3;  // of the Gauss points of elements
 };
 
-LinkRefinement::LinkRefinement(const PatchMesh& mesh, const Visibility& visibility,
-                               const ElementTree& tree, const ShaftCulling& culling,
-                               std::uint64_t seed)
-    : visibility_(visibility),
-      tree_(tree),
-      culling_(culling),
-      samples_(group_samples(mesh, tree, seed)),
-      polygons_(planar_polygons(mesh)) {}
+void Links::append(Links&& other) {
+  links.insert(links.end(), other.links.begin(), other.links.end());
+  for (PolynomialLink link : other.polynomial) {
+    link.first += coefficients_per_m2.size();
+    polynomial.push_back(link);
+  }
+  coefficients_per_m2.insert(coefficients_per_m2.end(), other.coefficients_per_m2.begin(),
+                             other.coefficients_per_m2.end());
+  counts.tried += other.counts.tried;
+  counts.hidden += other.counts.hidden;
+  counts.sampled += other.counts.sampled;
+  counts.rays += other.counts.rays;
+  counts.outlined += other.counts.outlined;
+  counts.sum_of_squares += other.counts.sum_of_squares;
+  other = {};
+}
 
-Links LinkRefinement::refine(const NodeLight& light, const LinkOptions& options) const {
+LinkRefinement::LinkRefinement(const PatchMesh& mesh, const Visibility& visibility,
+                               const GroupBasis& basis, const ShaftCulling& culling,
+                               double kernel_tolerance, std::uint64_t seed)
+    : visibility_(visibility),
+      basis_(basis),
+      tree_(basis.tree),
+      culling_(culling),
+      samples_(group_samples(mesh, basis.tree, seed)),
+      polygons_(planar_polygons(mesh)),
+      kernel_(polygons_, kernel_tolerance) {
+  for (const Piece& piece : mesh.pieces) blockers_.push_back({piece.polygon, piece.plane});
+}
+
+Links LinkRefinement::refine(const NodeLight& light, const LinkOptions& options,
+                             std::span<const Link> known) const {
   // Breadth first until there is work for all threads.
   std::deque<Pair> queue = {{0, 0}};
-  Walk first(*this, light, options);
+  Walk first(*this, light, options, known);
   while (!queue.empty() && queue.size() < kTasks) {
     const Pair pair = queue.front();
     queue.pop_front();
@@ -272,13 +465,13 @@ Links LinkRefinement::refine(const NodeLight& light, const LinkOptions& options)
   const std::vector<Pair> tasks(queue.begin(), queue.end());
   std::vector<Links> found(tasks.size() + 1);
   found.back() = std::move(first.found);
-  std::atomic<std::size_t> done{0}, links{0};
+  std::atomic<std::size_t> done{0}, bytes{0};
   std::mutex progress_lock;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tasks.size(), 4), [&](const auto& range) {
-    for (std::size_t t = range.begin(); t < range.end() && links <= options.most_links; ++t) {
-      Walk walk(*this, light, options);
+    for (std::size_t t = range.begin(); t < range.end() && bytes <= options.most_bytes; ++t) {
+      Walk walk(*this, light, options, known);
       walk.run(tasks[t]);
-      links += walk.found.links.size();
+      bytes += walk.found.bytes();
       found[t] = std::move(walk.found);
     }
     const std::size_t count = done += range.end() - range.begin();
@@ -286,19 +479,11 @@ Links LinkRefinement::refine(const NodeLight& light, const LinkOptions& options)
     const std::lock_guard guard(progress_lock);
     options.progress("links", static_cast<double>(count) / static_cast<double>(tasks.size()));
   });
-  if (links > options.most_links)
-    throw std::length_error("more than " + std::to_string(options.most_links) + " links");
+  if (bytes > options.most_bytes)
+    throw std::length_error("more than " + std::to_string(options.most_bytes >> 20) +
+                            " MiB of links");
   Links all;
-  all.links.reserve(links + found.back().links.size());
-  for (Links& part : found) {
-    all.links.insert(all.links.end(), part.links.begin(), part.links.end());
-    part.links = {};
-    all.tried += part.tried;
-    all.hidden += part.hidden;
-    all.sampled += part.sampled;
-    all.rays += part.rays;
-    all.sum_of_squares += part.sum_of_squares;
-  }
+  for (Links& part : found) all.append(std::move(part));
   return all;
 }
 

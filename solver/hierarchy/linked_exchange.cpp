@@ -14,85 +14,242 @@ using Eigen::Index;
 
 constexpr int kRepairSweeps = 60;
 constexpr double kMostChange = 2.0;  // of a row in one sweep
+constexpr int kMostBands = 8;        // of a pass
+
+// Where the links of each node as receiver begin; both of its ends receive.
+template <class AnyLink>
+std::vector<std::size_t> starts(const std::vector<AnyLink>& links, std::size_t nodes,
+                                std::vector<std::size_t>& first) {
+  first.assign(nodes + 1, 0);
+  for (const AnyLink& link : links) {
+    ++first[link.a + 1];
+    ++first[link.b + 1];
+  }
+  for (std::size_t k = 1; k < first.size(); ++k) first[k] += first[k - 1];
+  return {first.begin(), first.end() - 1};
+}
+
+// out += C in: n x n coefficients, `across` from one row to the next, Width numbers a term.
+template <int Width>
+[[gnu::always_inline]] inline void add_coupled_terms(const float* c, int n, int across, int along,
+                                                     const double* in, double* out) {
+  for (int k = 0; k < n; ++k) {
+    double sum[Width] = {};
+    for (int m = 0; m < n; ++m) {
+      const double coefficient = static_cast<double>(c[k * across + m * along]);
+      for (int b = 0; b < Width; ++b) sum[b] += coefficient * in[m * Width + b];
+    }
+    for (int b = 0; b < Width; ++b) out[k * Width + b] += sum[b];
+  }
+}
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#endif
+void
+add_coupled_terms_of_eight(const float* c, int n, int across, int along, const double* in,
+                           double* out) {
+  add_coupled_terms<8>(c, n, across, along, in, out);
+}
+
+template <int Width>
+void add_coupled(const float* c, int n, int across, int along, const double* in, double* out) {
+  if constexpr (Width == 8)
+    add_coupled_terms_of_eight(c, n, across, along, in, out);
+  else
+    add_coupled_terms<Width>(c, n, across, along, in, out);
+}
 
 }  // namespace
 
-LinkedExchange::LinkedExchange(ElementTree tree, Eigen::VectorXd area_m2,
-                               const std::vector<Link>& links)
-    : tree_(std::move(tree)),
+// One pass over the links for Width columns, of which the last may be wanting.
+template <int Width>
+class LinkedExchange::Product {
+ public:
+  explicit Product(const LinkedExchange& of)
+      : of_(of),
+        groups_(*of.groups_),
+        terms_(static_cast<std::size_t>(terms_of(of.degree_))),
+        sent_(groups_.tree.nodes.size() * terms_ * Width),
+        met_(sent_.size()) {}
+
+  // Columns of y = S x from `first` on.
+  void run(const BandMatrix& x, BandMatrix& y, Index first) {
+    columns_ = std::min<Index>(Width, x.cols() - first);
+    gather(x, first);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, groups_.tree.nodes.size(), 256),
+                      [&](const auto& range) {
+                        for (std::size_t k = range.begin(); k < range.end(); ++k) exchange(k);
+                      });
+    hand_down(y, first);
+  }
+
+ private:
+  double* at(std::vector<double>& values, std::size_t node) const {
+    return values.data() + node * terms_ * Width;
+  }
+
+  // Moments of what each group sends, children before parents.
+  void gather(const BandMatrix& x, Index first) {
+    std::fill(sent_.begin(), sent_.end(), 0.0);
+    for (std::size_t k = groups_.tree.nodes.size(); k-- > 0;) {
+      const ElementNode& node = groups_.tree.nodes[k];
+      double* const out = at(sent_, k);
+      if (node.is_leaf()) {
+        const Index i = groups_.tree.order[node.begin];
+        for (std::size_t t = 0; t < terms_; ++t) {
+          const double moment = of_.scale_[i] * groups_.moments_m2(i, static_cast<Index>(t));
+          for (Index b = 0; b < columns_; ++b)
+            out[static_cast<Index>(t) * Width + b] = moment * x(i, first + b);
+        }
+      } else {
+        for (std::size_t child : {node.left, node.right})
+          groups_.template push<Width>(child, of_.degree_, at(sent_, child), out);
+      }
+    }
+  }
+
+  void exchange(std::size_t node) {
+    double* const out = at(met_, node);
+    std::fill(out, out + terms_ * Width, 0.0);
+    double sum[Width] = {};
+    for (std::size_t l = of_.first_[node]; l < of_.first_[node + 1]; ++l) {
+      const double* const in = at(sent_, of_.half_[l].source);
+      const double kernel = of_.half_[l].kernel_per_m2;
+      for (int b = 0; b < Width; ++b) sum[b] += kernel * in[b];
+    }
+    std::copy(sum, sum + Width, out);
+    for (std::size_t l = of_.first_polynomial_[node]; l < of_.first_polynomial_[node + 1]; ++l) {
+      const HalfPolynomial& half = of_.half_polynomial_[l];
+      const int n = terms_of(half.degree);
+      add_coupled<Width>(of_.coefficients_per_m2_.data() + half.first, n, half.is_mirrored ? 1 : n,
+                         half.is_mirrored ? n : 1, at(sent_, half.source), out);
+    }
+  }
+
+  void hand_down(BandMatrix& y, Index first) {
+    for (std::size_t k = 0; k < groups_.tree.nodes.size(); ++k) {
+      const ElementNode& node = groups_.tree.nodes[k];
+      const double* const in = at(met_, k);
+      if (!node.is_leaf()) {
+        for (std::size_t child : {node.left, node.right})
+          groups_.template pull<Width>(child, of_.degree_, in, at(met_, child));
+        continue;
+      }
+      const Index i = groups_.tree.order[node.begin];
+      for (Index b = 0; b < columns_; ++b) {
+        double sum = 0.0;
+        for (Index t = 0; t < static_cast<Index>(terms_); ++t)
+          sum += groups_.moments_m2(i, t) * in[t * Width + b];
+        y(i, first + b) = of_.scale_[i] * sum;
+      }
+    }
+  }
+
+  const LinkedExchange& of_;
+  const GroupBasis& groups_;
+  std::size_t terms_;
+  Index columns_ = Width;
+  std::vector<double> sent_, met_;
+};
+
+LinkedExchange::LinkedExchange(std::shared_ptr<const GroupBasis> groups, Eigen::VectorXd area_m2,
+                               Links links)
+    : groups_(std::move(groups)),
       area_m2_(std::move(area_m2)),
       scale_(Eigen::VectorXd::Zero(area_m2_.size())),
-      first_(tree_.nodes.size() + 1, 0),
-      half_(2 * links.size()),
-      half_links_(links.size()) {
-  for (std::uint32_t patch : tree_.order) scale_[patch] = 1.0;
-  for (const Link& link : links) {
-    ++first_[link.a + 1];
-    ++first_[link.b + 1];
-  }
-  for (std::size_t k = 1; k < first_.size(); ++k) first_[k] += first_[k - 1];
-  std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
-  for (const Link& link : links) {
+      half_(2 * links.links.size()),
+      half_polynomial_(2 * links.polynomial.size()),
+      coefficients_per_m2_(std::move(links.coefficients_per_m2)),
+      links_(links.size()) {
+  for (std::uint32_t patch : groups_->tree.order) scale_[patch] = 1.0;
+  std::vector<std::size_t> next = starts(links.links, groups_->tree.nodes.size(), first_);
+  for (const Link& link : links.links) {
     half_[next[link.a]++] = {link.b, link.kernel_per_m2};
     half_[next[link.b]++] = {link.a, link.kernel_per_m2};
+  }
+  next = starts(links.polynomial, groups_->tree.nodes.size(), first_polynomial_);
+  for (const PolynomialLink& link : links.polynomial) {
+    const auto degree = static_cast<std::uint16_t>(link.degree);
+    half_polynomial_[next[link.a]++] = {link.b, degree, 0, link.first};
+    half_polynomial_[next[link.b]++] = {link.a, degree, 1, link.first};
+    degree_ = std::max(degree_, static_cast<int>(link.degree));
   }
   set_row_sum_max();
 }
 
 BandMatrix LinkedExchange::product(const BandMatrix& x) const {
-  const Index m = x.cols();
-  const std::size_t count = tree_.nodes.size();
-  BandMatrix sent(static_cast<Index>(count), m), met(static_cast<Index>(count), m);
-  for (std::size_t k = count; k-- > 0;) {
-    const ElementNode& node = tree_.nodes[k];
-    const auto row = static_cast<Index>(k);
-    if (node.is_leaf()) {
-      const Index i = tree_.order[node.begin];
-      sent.row(row) = area_m2_[i] * scale_[i] * x.row(i);
-    } else {
-      sent.row(row) = sent.row(node.left) + sent.row(node.right);
-    }
-  }
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 256), [&](const auto& range) {
-    for (std::size_t k = range.begin(); k < range.end(); ++k) {
-      double* const out = met.data() + static_cast<Index>(k) * m;
-      std::fill(out, out + m, 0.0);
-      for (std::size_t l = first_[k]; l < first_[k + 1]; ++l) {
-        const double* const in = sent.data() + static_cast<Index>(half_[l].source) * m;
-        const double kernel = half_[l].kernel_per_m2;
-        for (Index b = 0; b < m; ++b) out[b] += kernel * in[b];
-      }
-    }
-  });
-  BandMatrix y = BandMatrix::Zero(x.rows(), m);
-  for (std::size_t k = 0; k < count; ++k) {
-    const ElementNode& node = tree_.nodes[k];
-    const auto row = static_cast<Index>(k);
-    if (node.is_leaf()) {
-      const Index i = tree_.order[node.begin];
-      y.row(i) = area_m2_[i] * scale_[i] * met.row(row);
-    } else {
-      met.row(node.left) += met.row(row);
-      met.row(node.right) += met.row(row);
-    }
-  }
+  BandMatrix y = BandMatrix::Zero(x.rows(), x.cols());
+  const auto run = [&]<int Width>(Product<Width> pass) {
+    for (Index first = 0; first < x.cols(); first += Width) pass.run(x, y, first);
+  };
+  if (x.cols() == 1)
+    run(Product<1>(*this));
+  else if (x.cols() == 2)
+    run(Product<2>(*this));
+  else if (x.cols() <= 4)
+    run(Product<4>(*this));
+  else
+    run(Product<kMostBands>(*this));
   return y;
 }
 
 void LinkedExchange::row(Index i, Eigen::Ref<Eigen::VectorXd> values) const {
   values.setZero();
   if (scale_[i] == 0.0) return;
-  // Down from the root to the element: links of all groups on the way.
-  std::uint32_t at = 0;
-  const std::uint32_t leaf = tree_.leaf_of[static_cast<std::size_t>(i)];
-  while (true) {
-    for (std::size_t l = first_[at]; l < first_[at + 1]; ++l)
-      for (std::uint32_t j : tree_.patches_of(tree_.nodes[half_[l].source]))
-        values[j] += half_[l].kernel_per_m2;
-    if (at == leaf) break;
-    at = leaf < tree_.nodes[at].right ? tree_.nodes[at].left : tree_.nodes[at].right;
+  const ElementTree& tree = groups_->tree;
+  const auto terms = static_cast<std::size_t>(terms_of(degree_));
+  // Up from the element to the root: links of all groups on the way, and its moments there.
+  std::vector<std::uint32_t> way = {0};
+  const std::uint32_t leaf = tree.leaf_of[static_cast<std::size_t>(i)];
+  while (way.back() != leaf) {
+    const ElementNode& node = tree.nodes[way.back()];
+    way.push_back(leaf < node.right ? node.left : node.right);
   }
-  values = (values.array() * area_m2_.array() * scale_.array() * (area_m2_[i] * scale_[i])).eval();
+  std::vector<double> moments(terms), of_source(terms);
+  for (std::size_t t = 0; t < terms; ++t)
+    moments[t] = scale_[i] * groups_->moments_m2(i, static_cast<Index>(t));
+  for (;; way.pop_back()) {
+    const std::uint32_t at = way.back();
+    for (std::size_t l = first_[at]; l < first_[at + 1]; ++l) {
+      const double kernel = half_[l].kernel_per_m2;
+      for (std::uint32_t j : tree.patches_of(tree.nodes[half_[l].source]))
+        values[j] += moments[0] * kernel * area_m2_[j];
+    }
+    for (std::size_t l = first_polynomial_[at]; l < first_polynomial_[at + 1]; ++l) {
+      const HalfPolynomial& half = half_polynomial_[l];
+      const auto n = static_cast<std::size_t>(terms_of(half.degree));
+      std::fill(of_source.begin(), of_source.end(), 0.0);
+      for (std::size_t k = 0; k < n; ++k)
+        for (std::size_t m = 0; m < n; ++m)
+          of_source[m] +=
+              moments[k] *
+              static_cast<double>(
+                  coefficients_per_m2_[half.first + (half.is_mirrored ? m * n + k : k * n + m)]);
+      spread_to_elements(half.source, of_source, values);
+    }
+    if (at == 0) break;
+    std::vector<double> of_parent(terms, 0.0);
+    groups_->push<1>(at, degree_, moments.data(), of_parent.data());
+    moments = std::move(of_parent);
+  }
+  values.array() *= scale_.array();
+}
+
+void LinkedExchange::spread_to_elements(std::size_t node, const std::vector<double>& of_node,
+                                        Eigen::Ref<Eigen::VectorXd> values) const {
+  const ElementNode& group = groups_->tree.nodes[node];
+  if (group.is_leaf()) {
+    const Index j = groups_->tree.order[group.begin];
+    for (std::size_t t = 0; t < of_node.size(); ++t)
+      values[j] += of_node[t] * groups_->moments_m2(j, static_cast<Index>(t));
+    return;
+  }
+  for (std::size_t child : {group.left, group.right}) {
+    std::vector<double> of_child(of_node.size(), 0.0);
+    groups_->pull<1>(child, degree_, of_node.data(), of_child.data());
+    spread_to_elements(child, of_child, values);
+  }
 }
 
 Eigen::VectorXd LinkedExchange::row_sums() const {
@@ -101,7 +258,7 @@ Eigen::VectorXd LinkedExchange::row_sums() const {
 
 void LinkedExchange::set_row_sum_max() { row_sum_max_ = row_sums().maxCoeff(); }
 
-LinkedExchange::Repair LinkedExchange::close_rows(double least_row, bool closed) {
+LinkedExchange::Repair LinkedExchange::close_rows(double least_row, bool closed, double accuracy) {
   const Eigen::VectorXd before = scale_;
   const Eigen::VectorXd unscaled = row_sums();
   const auto is_mended = [&](Index i) { return scale_[i] > 0.0 && unscaled[i] >= least_row; };
@@ -116,7 +273,7 @@ LinkedExchange::Repair LinkedExchange::close_rows(double least_row, bool closed)
       scale_[i] *= step;
       change = std::max(change, std::abs(step - 1.0));
     }
-    if (change < 1e-10) break;
+    if (change < accuracy) break;
   }
   double largest = 1.0, smallest = 1.0;
   for (Index i = 0; i < scale_.size(); ++i)
@@ -135,8 +292,10 @@ LinkedExchange::Repair LinkedExchange::close_rows(double least_row, bool closed)
 }
 
 std::size_t LinkedExchange::bytes() const {
-  return half_.size() * sizeof(HalfLink) + first_.size() * sizeof(std::size_t) +
-         tree_.nodes.size() * sizeof(ElementNode);
+  return half_.size() * sizeof(HalfLink) + half_polynomial_.size() * sizeof(HalfPolynomial) +
+         coefficients_per_m2_.size() * sizeof(float) + 2 * first_.size() * sizeof(std::size_t) +
+         2 * groups_->tree.nodes.size() * static_cast<std::size_t>(terms_of(degree_)) * kMostBands *
+             sizeof(double);
 }
 
 }  // namespace truebox

@@ -7,6 +7,7 @@
 
 #include "mesh/add_piece.h"
 #include "mesh/graded_mesh.h"
+#include "mesh/uniform_cells.h"
 
 namespace truebox {
 namespace {
@@ -108,6 +109,10 @@ std::vector<Polygon> cells_of(const Polygon& piece, const Subdivision& cut) {
 void PatchMesh::polygon_of(const Patch& patch, Polygon& polygon) const {
   polygon.clear();
   for (std::uint32_t corner : corners_of(patch)) polygon.push_back(vertices[corner]);
+}
+
+std::vector<Polygon> uniform_cells(const Polygon& piece, double edge_m) {
+  return cells_of(piece, {edge_m, 0});
 }
 
 PatchMesh uniform_mesh(const Scene& scene, double edge_m, int level) {

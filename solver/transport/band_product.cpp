@@ -8,18 +8,13 @@
 #include <cstring>
 #include <vector>
 
+#include "transport/many_targets.h"
+
 namespace truebox {
 namespace {
 
 constexpr Eigen::Index kBands = 8;  // one panel: a cache line of doubles
 constexpr Eigen::Index kRows = 4;
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define TRUEBOX_MANY_TARGETS \
-  __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
-#else
-#define TRUEBOX_MANY_TARGETS
-#endif
 
 using Panel = double __attribute__((vector_size(kBands * sizeof(double))));
 
@@ -41,35 +36,54 @@ void four_rows(const double* s0, const double* s1, const double* s2, const doubl
   std::memcpy(sums + 3 * kBands, &d, sizeof d);
 }
 
-}  // namespace
+// Panels of eight bands, one after the other, zeros where bands end.
+std::vector<double> packed(const BandMatrix& x) {
+  const Eigen::Index n = x.rows(), m = x.cols(), panels = (m + kBands - 1) / kBands;
+  std::vector<double> values(static_cast<std::size_t>(panels * n * kBands), 0.0);
+  for (Eigen::Index panel = 0; panel < panels; ++panel) {
+    const Eigen::Index first = panel * kBands, count = std::min(kBands, m - first);
+    for (Eigen::Index j = 0; j < n; ++j)
+      std::copy_n(x.data() + j * m + first, count, values.data() + (panel * n + j) * kBands);
+  }
+  return values;
+}
 
-BandMatrix band_product(const Eigen::MatrixXd& symmetric, const BandMatrix& x) {
-  const Eigen::Index n = symmetric.rows(), m = x.cols();
-  const Eigen::Index panels = (m + kBands - 1) / kBands;
-  std::vector<double> packed(static_cast<std::size_t>(panels * n * kBands), 0.0);
-  for (Eigen::Index j = 0; j < n; ++j)
-    for (Eigen::Index k = 0; k < m; ++k)
-      packed[static_cast<std::size_t>((k / kBands * n + j) * kBands + k % kBands)] = x(j, k);
-  BandMatrix y(n, m);
+// `count` rows, `stride` apart, of each as many numbers as x has rows.
+BandMatrix product_of_rows(const double* rows, Eigen::Index count, Eigen::Index stride,
+                           const BandMatrix& x) {
+  const Eigen::Index n = x.rows(), m = x.cols(), panels = (m + kBands - 1) / kBands;
+  const std::vector<double> panel_values = packed(x);
+  BandMatrix y(count, m);
   tbb::parallel_for(
-      tbb::blocked_range<Eigen::Index>(0, (n + kRows - 1) / kRows, 8), [&](const auto& range) {
+      tbb::blocked_range<Eigen::Index>(0, (count + kRows - 1) / kRows, 8), [&](const auto& range) {
         double sums[kRows * kBands];
         // A block of rows stays in cache while the panels pass over it.
         for (Eigen::Index panel = 0; panel < panels; ++panel)
           for (Eigen::Index block = range.begin(); block < range.end(); ++block) {
             const Eigen::Index first = block * kRows;
-            // S is symmetric: its columns are its rows, and contiguous. The last block repeats a
-            // row.
+            // The last block repeats a row.
             const auto row = [&](Eigen::Index r) {
-              return symmetric.data() + std::min(first + r, n - 1) * n;
+              return rows + std::min(first + r, count - 1) * stride;
             };
-            four_rows(row(0), row(1), row(2), row(3), packed.data() + panel * n * kBands, n, sums);
-            for (Eigen::Index r = 0; r < kRows && first + r < n; ++r)
-              for (Eigen::Index k = 0; k < kBands && panel * kBands + k < m; ++k)
-                y(first + r, panel * kBands + k) = sums[r * kBands + k];
+            four_rows(row(0), row(1), row(2), row(3), panel_values.data() + panel * n * kBands, n,
+                      sums);
+            const Eigen::Index bands = std::min(kBands, m - panel * kBands);
+            for (Eigen::Index r = 0; r < kRows && first + r < count; ++r)
+              std::copy_n(sums + r * kBands, bands, y.data() + (first + r) * m + panel * kBands);
           }
       });
   return y;
+}
+
+}  // namespace
+
+// S is symmetric: its columns are its rows, and contiguous.
+BandMatrix band_product(const Eigen::MatrixXd& symmetric, const BandMatrix& x) {
+  return product_of_rows(symmetric.data(), symmetric.rows(), symmetric.rows(), x);
+}
+
+BandMatrix tall_product(const BandMatrix& tall, const BandMatrix& x) {
+  return product_of_rows(tall.data(), tall.rows(), tall.cols(), x);
 }
 
 }  // namespace truebox

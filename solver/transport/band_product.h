@@ -11,4 +11,8 @@ namespace truebox {
 /// parallel. The inner loop is compiled for several instruction sets and chosen at run time.
 BandMatrix band_product(const Eigen::MatrixXd& symmetric, const BandMatrix& x);
 
+/// Y = W X: the first k columns of W times k x m, few columns, rows in parallel, by the same inner
+/// loop.
+BandMatrix tall_product(const BandMatrix& tall, const BandMatrix& x);
+
 }  // namespace truebox

@@ -15,9 +15,13 @@ namespace truebox {
 struct ExactFormFactorOptions {
   double relative_tolerance = 1e-4;  ///< of the unoccluded kernel, each pair
   bool occlusion = true;             ///< false where the scene cannot block (see Requirements)
-  /// 2, 3 or 4: partly hidden pairs are seen from that many squared points of one patch, each with
-  /// the exact outlines of the shadows. 0: exact visibility, adaptive to relative_tolerance.
+  /// 2, 3 or 4: partly hidden pairs are seen from that many squared points of one patch, the one
+  /// over which the shadows change less, each with the exact outlines of the shadows. 0: exact
+  /// visibility, adaptive to relative_tolerance.
   int outline_points = 3;
+  /// Twice as many points a direction where these points find the form factor of the smaller patch
+  /// rougher than this.
+  double outline_tolerance = 3e-4;
 };
 
 /// All pairs of a mesh without rays and without noise, as one symmetric matrix of exchange areas

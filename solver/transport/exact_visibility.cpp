@@ -5,9 +5,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "transport/nusselt.h"
 #include "transport/quadrature.h"
+#include "transport/shadow_cones.h"
 #include "transport/split_by_shadows.h"
 #include "transport/view_events.h"
 
@@ -39,22 +41,124 @@ double roughness(const std::array<double, 5>& f) {
   return std::abs(p3) + std::abs(p4);
 }
 
+// Behind polygons: visible and hidden parts of the source, and the cells between visual events.
+class BehindPolygons {
+ public:
+  BehindPolygons(const PlanarPolygon& receiver, const PlanarPolygon& source,
+                 std::span<const Blocker* const> blockers, int nusselt_arcs)
+      : receiver_(receiver), source_(source), blockers_(blockers), arcs_(nusselt_arcs) {}
+
+  std::vector<Polygon> cells() const {
+    return cells_between_events(receiver_, source_, blockers_, kMostCells);
+  }
+  double visible(const Vec3& point) { return factor_sum(point, split(point)); }
+  double hidden(const Vec3& point) {
+    split(point);
+    return factor_sum(point, parts_.hidden());
+  }
+
+ private:
+  std::span<const Polygon> split(const Vec3& point) {
+    return parts_(point, source_.vertices, source_.plane, blockers_);
+  }
+  double factor_sum(const Vec3& point, std::span<const Polygon> parts) const {
+    double sum = 0.0;
+    const Vec3& normal = receiver_.plane.normal;
+    for (const Polygon& part : parts)
+      sum += arcs_ > 0 ? nusselt_factor(point, normal, part, arcs_)
+                       : point_to_polygon(point, normal, part);
+    return sum;
+  }
+
+  const PlanarPolygon& receiver_;
+  const PlanarPolygon& source_;
+  std::span<const Blocker* const> blockers_;
+  int arcs_;
+  SplitByShadows parts_;
+};
+
+// The same behind convex solids.
+class BehindSolids {
+ public:
+  BehindSolids(const PlanarPolygon& receiver, const PlanarPolygon& source,
+               std::span<const ConvexOccluder* const> solids)
+      : receiver_(receiver),
+        source_(source),
+        solids_(solids),
+        cones_(solids.size()),
+        tolerance_m_(1e-13 * (receiver.centroid - source.centroid).norm()) {}
+
+  std::vector<Polygon> cells() const {
+    return cells_between_events(receiver_, source_, solids_, kMostCells);
+  }
+  double visible(const Vec3& point) {
+    switch (look(point)) {
+      case ShadowSide::outside: return whole(point);
+      case ShadowSide::inside: return 0.0;
+      default: return parts_.visible_factor(point, receiver_.plane.normal);
+    }
+  }
+  double hidden(const Vec3& point) {
+    switch (look(point)) {
+      case ShadowSide::outside: return 0.0;
+      case ShadowSide::inside: return whole(point);
+      default: return parts_.hidden_factor(point, receiver_.plane.normal);
+    }
+  }
+  // Too many parts or planes somewhere: what was found is nothing worth.
+  bool failed() const { return failed_; }
+
+ private:
+  double whole(const Vec3& point) const {
+    return point_to_polygon(point, receiver_.plane.normal, source_.vertices);
+  }
+
+  // `across`: the parts are cut.
+  ShadowSide look(const Vec3& point) {
+    active_.clear();
+    for (std::size_t k = 0; k < solids_.size(); ++k) {
+      const auto hides =
+          ShadowCone::make(point, receiver_.plane.normal, *solids_[k], tolerance_m_, cones_[k]);
+      if (hides == ShadowCone::Hides::nothing) continue;
+      if (hides == ShadowCone::Hides::all) return ShadowSide::inside;
+      failed_ = failed_ || cones_[k].count == 0;
+      const ShadowSide side = test_shadow(cones_[k], source_).side;
+      if (side == ShadowSide::inside) return side;
+      if (side == ShadowSide::across) active_.push_back(&cones_[k]);
+    }
+    if (active_.empty()) return ShadowSide::outside;
+    failed_ = failed_ || !parts_.cut(source_.vertices, active_);
+    return ShadowSide::across;
+  }
+
+  const PlanarPolygon& receiver_;
+  const PlanarPolygon& source_;
+  std::span<const ConvexOccluder* const> solids_;
+  std::vector<ShadowCone> cones_;
+  std::vector<const ShadowCone*> active_;
+  ShadowParts parts_;
+  double tolerance_m_;
+  bool failed_ = false;
+};
+
+template <class Shadows>
 class Integrator {
  public:
-  Integrator(const PlanarPolygon& receiver, const PlanarPolygon& source,
-             std::span<const Blocker* const> blockers, const ExactVisibilityOptions& options)
-      : receiver_(receiver), source_(source), blockers_(blockers), options_(options) {}
+  Integrator(const PlanarPolygon& receiver, const PlanarPolygon& source, Shadows shadows,
+             const ExactVisibilityOptions& options)
+      : receiver_(receiver), source_(source), shadows_(std::move(shadows)), options_(options) {}
+
+  const Shadows& shadows() const { return shadows_; }
 
   VisibleExchange run() {
-    for (const Polygon& cell : cells_between_events(receiver_, source_, blockers_, kMostCells))
-      add_cells(cell);
+    for (const Polygon& cell : shadows_.cells()) add_cells(cell);
     double visible = 0.0, hidden = 0.0;
     for (const Cell& cell : cells_) {
       const auto& q = cell.corners;
       const Vec3 middle = q[3] == q[0] ? Vec3((q[0] + q[1] + q[2]) / 3.0)
                                        : Vec3(0.25 * (q[0] + q[1] + q[2] + q[3]));
       visible += cell.area_m2 * factor_at(middle, true);
-      hidden += cell.area_m2 * factor_sum(middle, parts_.hidden());
+      hidden += cell.area_m2 * factor_at(middle, false);
     }
     const double all = visible + hidden;
     VisibleExchange result;
@@ -69,25 +173,15 @@ class Integrator {
     result.evaluations = evaluations_;
     result.converged =
         result.error_bound_m2 <= options_.relative_tolerance * result.exchange_area_m2 ||
+        result.error_bound_m2 <= options_.absolute_tolerance_m2 ||
         result.error_bound_m2 <= 2.0 * (rounding + whole.error_bound_m2);
     return result;
   }
 
  private:
-  double factor_sum(const Vec3& point, std::span<const Polygon> parts) const {
-    double sum = 0.0;
-    const Vec3& normal = receiver_.plane.normal;
-    const int arcs = options_.nusselt_arcs;
-    for (const Polygon& part : parts)
-      sum += arcs > 0 ? nusselt_factor(point, normal, part, arcs)
-                      : point_to_polygon(point, normal, part);
-    return sum;
-  }
-
   double factor_at(const Vec3& point, bool visible) {
     ++evaluations_;
-    const auto seen = parts_(point, source_.vertices, source_.plane, blockers_);
-    return factor_sum(point, visible ? seen : parts_.hidden());
+    return visible ? shadows_.visible(point) : shadows_.hidden(point);
   }
 
   void add_cells(const Polygon& p) {
@@ -157,7 +251,8 @@ class Integrator {
     std::make_heap(cells_.begin(), cells_.end(), less);
     const auto target = [&] {
       const double result = integrate_visible_ ? value_ : whole - value_;
-      return std::max(0.9 * options_.relative_tolerance * result - rounding, 0.5 * rounding);
+      return std::max({0.9 * options_.relative_tolerance * result - rounding,
+                       options_.absolute_tolerance_m2 - rounding, 0.5 * rounding});
     };
     while (!cells_.empty() && error_ > target() && evaluations_ < options_.most_evaluations) {
       std::pop_heap(cells_.begin(), cells_.end(), less);
@@ -209,9 +304,8 @@ class Integrator {
 
   const PlanarPolygon& receiver_;
   const PlanarPolygon& source_;
-  std::span<const Blocker* const> blockers_;
+  Shadows shadows_;
   const ExactVisibilityOptions& options_;
-  SplitByShadows parts_;
   std::vector<Cell> cells_;
   bool integrate_visible_ = true;
   double value_ = 0.0, error_ = 0.0;
@@ -226,8 +320,24 @@ VisibleExchange visible_exchange(const PlanarPolygon& i, const PlanarPolygon& j,
   Polygon part_i, part_j;
   if (!facing_parts(i, j, part_i, part_j)) return {0.0, 0.0, 0, true};
   const PlanarPolygon a(std::move(part_i)), b(std::move(part_j));
-  return b.radius_m < a.radius_m ? Integrator(b, a, blockers, options).run()
-                                 : Integrator(a, b, blockers, options).run();
+  const bool b_receives = b.radius_m < a.radius_m;
+  const PlanarPolygon &receiver = b_receives ? b : a, &source = b_receives ? a : b;
+  return Integrator(receiver, source,
+                    BehindPolygons(receiver, source, blockers, options.nusselt_arcs), options)
+      .run();
+}
+
+std::optional<VisibleExchange> visible_exchange(const PlanarPolygon& receiver,
+                                                const PlanarPolygon& source,
+                                                std::span<const ConvexOccluder* const> solids,
+                                                const ExactVisibilityOptions& options) {
+  Polygon part_i, part_j;
+  if (!facing_parts(receiver, source, part_i, part_j)) return VisibleExchange{0.0, 0.0, 0, true};
+  const PlanarPolygon a(std::move(part_i)), b(std::move(part_j));
+  Integrator work(a, b, BehindSolids(a, b, solids), options);
+  const VisibleExchange result = work.run();
+  if (work.shadows().failed()) return std::nullopt;
+  return result;
 }
 
 }  // namespace truebox

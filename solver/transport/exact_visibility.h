@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <span>
 
 #include "transport/bounded_exchange.h"
+#include "transport/convex_occluder.h"
 #include "transport/visible_parts.h"
 
 namespace truebox {
 
 struct ExactVisibilityOptions {
   double relative_tolerance = 1e-9;          ///< of the visible exchange area
+  double absolute_tolerance_m2 = 0.0;        ///< suffices, too
   std::size_t most_evaluations = 2'000'000;  ///< points of the receiver; then the bound says so
   int nusselt_arcs =
       0;  ///< above 0: nusselt_factor with as many chords in place of Lambert's formula
@@ -37,5 +40,12 @@ struct VisibleExchange {
 VisibleExchange visible_exchange(const PlanarPolygon& i, const PlanarPolygon& j,
                                  std::span<const Blocker* const> blockers,
                                  const ExactVisibilityOptions& options);
+
+/// The same behind convex solids, several times as fast. Nothing if the parts of the source become
+/// too many for the memory of ShadowParts, or the planes of a solid.
+std::optional<VisibleExchange> visible_exchange(const PlanarPolygon& receiver,
+                                                const PlanarPolygon& source,
+                                                std::span<const ConvexOccluder* const> solids,
+                                                const ExactVisibilityOptions& options);
 
 }  // namespace truebox

@@ -294,7 +294,8 @@ void require_memory(std::size_t elements, const FormFactorOptions& options) {
   throw std::length_error(std::to_string(elements) + " elements need " +
                           std::to_string(bytes >> 20) + " MiB of form factors, the limit is " +
                           std::to_string(options.memory_limit_bytes >> 20) + " MiB; that fits " +
-                          std::to_string(static_cast<std::size_t>(fits)) + " elements");
+                          std::to_string(static_cast<std::size_t>(fits)) +
+                          " elements. Form factors that are streamed or hierarchical take less");
 }
 
 namespace {
@@ -304,6 +305,7 @@ FormFactors without_rays(const PatchMesh& mesh, const Scene& scene, const Visibi
   ExactFormFactorOptions exact_options;
   exact_options.relative_tolerance = options.relative_tolerance;
   exact_options.occlusion = options.occlusion;
+  exact_options.outline_points = options.outline_points;
   auto exact = exact_form_factors<double>(mesh, scene, exact_options, options.memory_limit_bytes);
   FormFactors result;
   result.exchange_area_m2 = std::move(exact.exchange_area_m2);

@@ -14,15 +14,16 @@ namespace truebox {
 
 /// How the visible share of a pair that something may stand between is found.
 enum class FormFactorMethod {
-  ray_casting,      ///< quasi-random rays: quick, with noise
+  ray_casting,      ///< quasi-random rays: with noise, which several seeds can tell apart
   exact_visibility  ///< outlines of the shadows from nine points of a patch: no noise
 };
 
 struct FormFactorOptions {
-  FormFactorMethod method = FormFactorMethod::ray_casting;
+  FormFactorMethod method = FormFactorMethod::exact_visibility;
   double relative_tolerance = 1e-5;  ///< of the unoccluded kernel, each pair
   bool occlusion = true;             ///< false where the scene cannot block (see Requirements)
-  int rays = 16;  ///< of a pair that something may stand between; at least 4, not a multiple of 7
+  int rays = 16;  ///< ray_casting: of a partly hidden pair; at least 4, not a multiple of 7
+  int outline_points = 3;  ///< exact_visibility: 2, 3 or 4, squared, on a patch of a hidden pair
   std::uint64_t seed = 1;
   std::size_t memory_limit_bytes = std::size_t{8} << 30;
   Progress progress;
@@ -30,7 +31,7 @@ struct FormFactorOptions {
 
 /// How the factors were found and how well they close.
 struct FormFactorSummary {
-  FormFactorMethod method = FormFactorMethod::ray_casting;
+  FormFactorMethod method = FormFactorMethod::exact_visibility;
   std::size_t pairs_unoccluded = 0, pairs_hidden = 0, pairs_sampled = 0;
   std::size_t rays = 0;
   std::size_t buried_patches = 0;  ///< lie under another surface and see nothing
@@ -41,6 +42,7 @@ struct FormFactorSummary {
   double repair_max = 0.0;            ///< largest relative change of a sampled factor
   double closure_residual_max = 0.0;  ///< max |sum_j F_ij - 1| after repair
   double row_sum_max = 0.0;           ///< max sum_j F_ij as used
+  int streamed_passes = 0;            ///< over all pairs, before the solve, where they are not kept
 };
 
 /// All pairs of a mesh as one symmetric matrix of exchange areas S_ij = A_i F_ij (m^2), n x n, so

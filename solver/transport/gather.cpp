@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "transport/form_factor.h"
-#include "transport/quadrature.h"
+#include "transport/polygon_rule.h"
 
 namespace truebox {
 namespace {
@@ -21,25 +21,7 @@ Eigen::Map<const Eigen::VectorXd> as_vector(const std::vector<double>& values) {
   return {values.data(), static_cast<Eigen::Index>(values.size())};
 }
 
-// Calls visit(point, weight) for a 4 x 4 Gauss rule on a convex polygon; weights sum to 1.
-template <class Visit>
-void for_each_gauss_point(const Polygon& polygon, const Visit& visit) {
-  constexpr int kPoints = 4;
-  const GaussRule& rule = gauss_rule(kPoints);
-  const Vec3 area = area_vector(polygon);
-  const Vec3 normal = area.normalized();
-  const bool quad = polygon.size() == 4;
-  for (std::size_t k = 2; k < (quad ? 3 : polygon.size()); ++k) {
-    const Vec3 &a = polygon[0], &b = polygon[k - 1], &c = polygon[k], &d = quad ? polygon[3] : a;
-    for (int j = 0; j < kPoints; ++j)
-      for (int i = 0; i < kPoints; ++i) {
-        const double u = rule.nodes[i], v = rule.nodes[j];
-        const Vec3 du = (1 - v) * (b - a) + v * (c - d), dv = (1 - u) * (d - a) + u * (c - b);
-        visit(Vec3((1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * d + u * c)),
-              rule.weights[i] * rule.weights[j] * normal.dot(du.cross(dv)) / area.norm());
-      }
-  }
-}
+constexpr int kRulePoints = 4;  // a side
 
 }  // namespace
 
@@ -112,7 +94,7 @@ double Gather::mean_factor(std::uint32_t patch_index, std::uint32_t luminaire,
     return exchange_area_m2(PlanarPolygon(polygon), PlanarPolygon(piece.polygon), 1e-12) /
            patch.area_m2;
   double factor = 0.0;
-  for_each_gauss_point(polygon, [&](const Vec3& point, double weight) {
+  for_each_gauss_point(polygon, kRulePoints, [&](const Vec3& point, double weight) {
     if (piece.plane.distance_m(point) <= tolerance_m_) return;
     const Plane horizon{plane.normal, plane.normal.dot(point)};
     scratch.blockers.clear();

@@ -4,17 +4,33 @@
 #include <algorithm>
 #include <numeric>
 
-#include "transport/shaft.h"
-
 namespace truebox {
+namespace {
 
-// A walk down two trees at once. Blockers that are still in question live on a stack.
+constexpr std::uint32_t kNone = 0xffffffffu;
+
+// Whether corners of the mesh lie on both sides of a plane.
+bool stands_between(const Plane& plane, const PatchMesh& mesh, double tolerance_m) {
+  bool front = false, behind = false;
+  for (const Piece& piece : mesh.pieces)
+    for (const Vec3& v : piece.polygon) {
+      const double height = plane.distance_m(v);
+      front |= height > tolerance_m;
+      behind |= height < -tolerance_m;
+      if (front && behind) return true;
+    }
+  return false;
+}
+
+}  // namespace
+
+// A walk down two trees at once. Occluders that are still in question live on a stack.
 class PairPlanner::Walk {
  public:
   Walk(const PairPlanner& planner, const Visitor& visitor) : planner_(planner), visitor_(visitor) {}
 
   void run(const Node& a, const Node& b) {
-    stack_.resize(planner_.blockers_.size());
+    stack_.resize(planner_.occluders_.size());
     std::iota(stack_.begin(), stack_.end(), 0u);
     descend(a, b, 0);
   }
@@ -27,16 +43,23 @@ class PairPlanner::Walk {
                        [&](const Vec3& v) { return plane.distance_m(v) > planner_.tolerance_m_; });
   }
 
-  // Keeps the blockers that may stand in the shaft on top of the stack; false if one closes it.
-  bool keep_blockers(const Node& a, const Node& b, std::size_t from, std::size_t to) {
+  bool all_in_front(const Node& node, const Plane& plane) const {
+    return std::all_of(node.outline.begin(), node.outline.end(), [&](const Vec3& v) {
+      return plane.distance_m(v) >= -planner_.tolerance_m_;
+    });
+  }
+
+  // Keeps the occluders that may stand in the shaft on top of the stack; false if one closes it.
+  bool keep_occluders(const Node& a, const Node& b, std::size_t from, std::size_t to) {
     const Eigen::AlignedBox3d hull = a.box.merged(b.box);
+    const std::uint32_t own_a = planner_.occluder_of_piece_[a.piece];
+    const std::uint32_t own_b = planner_.occluder_of_piece_[b.piece];
     for (std::size_t k = from; k < to; ++k) {
       const std::uint32_t id = stack_[k];
-      const std::uint32_t piece = planner_.piece_of_blocker_[id];
-      if (piece == a.piece || piece == b.piece || !hull.intersects(planner_.blocker_box_[id]))
-        continue;
+      // A face of a convex solid looks away from it.
+      if (id == own_a || id == own_b || !hull.intersects(planner_.occluders_[id].box)) continue;
       switch (shaft_occlusion(a.outline, plane_of(a), b.outline, plane_of(b),
-                              planner_.shaft_blockers_[id], planner_.tolerance_m_)) {
+                              planner_.occluders_[id], planner_.tolerance_m_)) {
         case ShaftOcclusion::full: return false;
         case ShaftOcclusion::partial: stack_.push_back(id); break;
         case ShaftOcclusion::none: break;
@@ -48,10 +71,11 @@ class PairPlanner::Walk {
   void descend(const Node& a, const Node& b, std::size_t from) {
     if (!any_in_front(a, plane_of(b)) || !any_in_front(b, plane_of(a))) return;
     const std::size_t to = stack_.size();
-    if (!keep_blockers(a, b, from, to)) {
+    if (!keep_occluders(a, b, from, to)) {
       visitor_.hidden(static_cast<std::size_t>(a.end - a.begin) * (b.end - b.begin));
     } else if (stack_.size() == to) {
-      visitor_.unoccluded(patches(a), patches(b));
+      visitor_.unoccluded(patches(a), patches(b),
+                          all_in_front(a, plane_of(b)) && all_in_front(b, plane_of(a)));
     } else if (a.left == 0 && b.left == 0) {
       visitor_.partial(planner_.order_[a.begin], planner_.order_[b.begin],
                        {stack_.data() + to, stack_.size() - to});
@@ -78,18 +102,8 @@ PairPlanner::PairPlanner(const PatchMesh& mesh, const Scene& scene,
                          const std::vector<PlanarPolygon>& patches, double tolerance_m,
                          bool occlusion)
     : mesh_(mesh), patches_(patches), tolerance_m_(tolerance_m) {
-  for (std::uint32_t p = 0; p < mesh.pieces.size() && occlusion; ++p) {
-    const Piece& piece = mesh.pieces[p];
-    if (scene.surfaces[piece.surface].is_opening) continue;
-    blockers_.push_back({piece.polygon, piece.plane});
-    shaft_blockers_.emplace_back(blockers_.back());
-    piece_of_blocker_.push_back(p);
-    blocker_box_.emplace_back();
-    for (const Vec3& v : piece.polygon) blocker_box_.back().extend(v);
-    // Boxes of flat pieces are thin: rounding must not pull them out of a shaft.
-    blocker_box_.back().min().array() -= tolerance_m;
-    blocker_box_.back().max().array() += tolerance_m;
-  }
+  occluder_of_piece_.assign(mesh.pieces.size(), kNone);
+  if (occlusion) find_occluders(scene);
   order_.resize(mesh.size());
   std::iota(order_.begin(), order_.end(), 0u);
   leaf_.resize(mesh.size());
@@ -116,6 +130,26 @@ PairPlanner::PairPlanner(const PatchMesh& mesh, const Scene& scene,
   for (std::uint32_t p = 0; p < mesh.pieces.size(); ++p)
     for (std::uint32_t q = p + 1; q < mesh.pieces.size(); ++q)
       for (std::uint32_t group : groups[p]) tasks_.push_back({group, root_[q]});
+}
+
+void PairPlanner::find_occluders(const Scene& scene) {
+  std::vector<std::uint32_t> piece_of_blocker;
+  for (std::uint32_t p = 0; p < mesh_.pieces.size(); ++p) {
+    const Piece& piece = mesh_.pieces[p];
+    if (scene.surfaces[piece.surface].is_opening) continue;
+    blockers_.push_back({piece.polygon, piece.plane});
+    piece_of_blocker.push_back(p);
+  }
+  for (ConvexOccluder& solid : convex_occluders(blockers_, tolerance_m_)) {
+    const Blocker& first = blockers_[solid.members[0]];
+    if (solid.members.size() == 1 && !stands_between(first.plane, mesh_, tolerance_m_)) continue;
+    for (std::uint32_t member : solid.members)
+      occluder_of_piece_[piece_of_blocker[member]] = static_cast<std::uint32_t>(occluders_.size());
+    // Boxes of flat pieces are thin: rounding must not pull them out of a shaft.
+    solid.box.min().array() -= tolerance_m_;
+    solid.box.max().array() += tolerance_m_;
+    occluders_.push_back(std::move(solid));
+  }
 }
 
 std::uint32_t PairPlanner::make_node(std::uint32_t piece, std::uint32_t begin, std::uint32_t end,

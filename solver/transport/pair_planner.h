@@ -7,26 +7,27 @@
 #include <vector>
 
 #include "mesh/patch_mesh.h"
+#include "transport/convex_occluder.h"
 #include "transport/form_factor.h"
-#include "transport/shaft.h"
-#include "transport/visible_parts.h"
 
 namespace truebox {
 
 /// Sorts all pairs of patches into unoccluded, hidden and partly hidden by the shafts between them,
 /// whole groups at once: patches of a piece form a tree of rectangles, and a shaft between two
-/// rectangles that nothing enters, or that one blocker closes, needs no look at its pairs.
+/// rectangles that nothing enters, or that one solid closes, needs no look at its pairs.
 /// Sources: Haines & Wallace (1994); Teller & Hanrahan (1993), hierarchical visibility.
 class PairPlanner {
  public:
   struct Visitor {
-    /// Nothing can stand between any of `i` and any of `j`. Some may show each other their backs.
-    std::function<void(std::span<const std::uint32_t> i, std::span<const std::uint32_t> j)>
+    /// Nothing can stand between any of `i` and any of `j`, two runs of PairPlanner::order. If they
+    /// do not face each other wholly, some may show each other their backs.
+    std::function<void(std::span<const std::uint32_t> i, std::span<const std::uint32_t> j,
+                       bool face_wholly)>
         unoccluded;
-    /// `blockers` (into PairPlanner::blockers) may hide a part; none hides all.
-    std::function<void(std::uint32_t i, std::uint32_t j, std::span<const std::uint32_t> blockers)>
+    /// `occluders` (into PairPlanner::occluders) may hide a part; none hides all.
+    std::function<void(std::uint32_t i, std::uint32_t j, std::span<const std::uint32_t> occluders)>
         partial;
-    /// One blocker hides each of the pairs.
+    /// One occluder hides each of the pairs.
     std::function<void(std::size_t pairs)> hidden;
   };
 
@@ -34,7 +35,15 @@ class PairPlanner {
   PairPlanner(const PatchMesh& mesh, const Scene& scene, const std::vector<PlanarPolygon>& patches,
               double tolerance_m, bool occlusion);
 
+  /// What can come between patches: solids of the scene's polygons that have something on both of
+  /// their sides. Their members are indices into blockers().
+  const std::vector<ConvexOccluder>& occluders() const { return occluders_; }
   const std::vector<Blocker>& blockers() const { return blockers_; }
+  /// All patches, neighbours next to each other, those of a piece together and in pieces' order.
+  std::span<const std::uint32_t> order() const { return order_; }
+  std::size_t position_of(std::span<const std::uint32_t> run) const {
+    return static_cast<std::size_t>(run.data() - order_.data());
+  }
 
   /// Independent shares of the work: each pair of patches of different pieces is in one of them.
   std::size_t tasks() const { return tasks_.size(); }
@@ -56,6 +65,7 @@ class PairPlanner {
   };
   class Walk;
 
+  void find_occluders(const Scene& scene);
   std::uint32_t make_node(std::uint32_t piece, std::uint32_t begin, std::uint32_t end,
                           const Vec3& u, const Vec3& v);
 
@@ -63,9 +73,8 @@ class PairPlanner {
   const std::vector<PlanarPolygon>& patches_;
   double tolerance_m_;
   std::vector<Blocker> blockers_;
-  std::vector<ShaftBlocker> shaft_blockers_;
-  std::vector<std::uint32_t> piece_of_blocker_;
-  std::vector<Eigen::AlignedBox3d> blocker_box_;
+  std::vector<ConvexOccluder> occluders_;
+  std::vector<std::uint32_t> occluder_of_piece_;
   std::vector<std::uint32_t> order_;
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> root_;  // of each piece

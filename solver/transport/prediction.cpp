@@ -2,9 +2,11 @@
 #include "transport/prediction.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "transport/direct_light.h"
 #include "transport/grid_difference.h"
+#include "transport/near_sources.h"
 #include "transport/sensitivity.h"
 
 namespace truebox {
@@ -43,16 +45,19 @@ Prediction::Prediction(const Scene& scene, const PredictOptions& options)
   require_lambertian(scene);
   distinct_scene_ = in_bands(scene, needs_.distinct_bands);
   const double edge_m = edge_for_count(scene, std::max<std::size_t>(1, options.elements / 16));
-  // The finest grid decides; better told before the others are solved.
-  if (needs_.interreflection && !options.find_exchange && !options.solve_grid)
-    require_memory(mesh_of(edge_m, kFinestSplit, options).size(), options.form_factors);
-  for (int k = 2; k >= 0; --k) levels_[k] = solve_level(edge_m, kFinestSplit - k, options);
-  if (options.error_shares && needs_.interreflection &&
-      options.form_factors.method == FormFactorMethod::exact_visibility) {
-    error_shares_ = find_error_shares(*levels_[1]);  // nothing to sample again
-  } else if (options.error_shares && needs_.interreflection) {
-    PredictOptions again = options;
+  PredictOptions chosen = options;
+  if (needs_.interreflection) {
+    const PatchMesh finest = mesh_of(edge_m, kFinestSplit, options);
+    // The finest grid decides; better told before the others are solved.
+    if (!options.find_exchange && !options.solve_grid)
+      require_memory(finest.size(), options.form_factors);
+    if (!options.near_sources) chosen.near_sources = !is_resolved(finest);
+  }
+  for (int k = 2; k >= 0; --k) levels_[k] = solve_level(edge_m, kFinestSplit - k, chosen);
+  if (options.error_shares && needs_.interreflection) {
+    PredictOptions again = chosen;
     again.form_factors.seed += 1000;
+    again.form_factors.outline_points = options.form_factors.outline_points == 4 ? 3 : 4;
     again.sensitivities = false;
     error_shares_ = find_error_shares(*solve_level(edge_m, 1, again));
   }
@@ -90,13 +95,16 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   factor_options.occlusion = needs_.occlusion;
   factor_options.seed = options.form_factors.seed + static_cast<std::uint64_t>(split);
   factor_options.progress = options.progress;
+  GridTask task{distinct_scene_, rho, source, factor_options, options.solve, {}};
+  if (options.near_sources.value_or(false))
+    task.near_sources = [&](const GridSolution& first) {
+      return near_source_correction(first.mesh, distinct_scene_, *level->gather, first.usable, rho,
+                                    rho.cwiseProduct(first.indirect));
+    };
   if (options.solve_grid) {
-    options.solve_grid({distinct_scene_, rho, source, factor_options, options.solve}, grid);
+    options.solve_grid(task, grid);
     return level;
   }
-  SolveOptions solve_options = options.solve;
-  if (options.watch_finest && split == kFinestSplit)
-    solve_options.on_progress = options.watch_finest(grid.mesh, source);
   const Visibility visibility(grid.mesh, distinct_scene_);
   const FindExchange find = options.find_exchange ? options.find_exchange : full_matrix;
   FoundExchange found =
@@ -104,11 +112,50 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   grid.usable = std::move(found.usable);
   grid.form_factors = found.summary;
   grid.links = found.links;
-  grid.solve = solve_radiosity(*found.exchange, rho, source, solve_options, grid.reflected,
-                               options.progress, &grid.indirect);
+  if (found.links) task.near_sources = {};  // they split bright sources themselves
+  auto watch = split == kFinestSplit ? options.watch_finest : nullptr;  // the first solution
+  solve_with_near_sources(task, grid, [&](const BandMatrix& of, const SolveOptions& how) {
+    SolveOptions watched = how;
+    if (watch) watched.on_progress = std::exchange(watch, nullptr)(grid.mesh, of);
+    grid.solve = solve_radiosity(*found.exchange, rho, of, watched, grid.reflected,
+                                 options.progress, &grid.indirect);
+  });
   if (options.sensitivities && split == kFinestSplit)
-    differentiate(*found.exchange, rho, options.solve, grid);
+    differentiate(*found.exchange, task, *level->gather, grid);
   return level;
+}
+
+void solve_with_near_sources(
+    const GridTask& task, GridSolution& grid,
+    const std::function<void(const BandMatrix& source, const SolveOptions& options)>& solve) {
+  solve(task.source, task.solve);
+  if (!task.near_sources || grid.solve.outcome != SolveOutcome::converged) return;
+  const SolveSummary first = std::move(grid.solve);
+  const BandMatrix missing = task.near_sources(grid);
+  const BandMatrix more = task.rho.cwiseProduct(missing);
+  const BandMatrix reflected = std::move(grid.reflected);
+  const BandMatrix indirect = std::move(grid.indirect) + missing;
+  // What they add is small and need not be known to more digits than the whole.
+  SolveOptions rest = task.solve;
+  const Eigen::ArrayXd part = more.cwiseAbs().colwise().maxCoeff().transpose();
+  const Eigen::ArrayXd whole = reflected.cwiseAbs().colwise().maxCoeff().transpose();
+  rest.relative_bound = std::clamp(
+      rest.relative_bound * (part > 0.0).select(whole / part.max(1e-300), 1e300).minCoeff(),
+      rest.relative_bound, 0.1);
+  solve(more, rest);
+  grid.reflected += reflected;
+  grid.indirect += indirect;
+  grid.solve.bands_reduced = first.bands_reduced;
+  grid.solve.iterations += first.iterations;
+  grid.solve.matrix_passes += first.matrix_passes;
+  grid.solve.residual_history.insert(grid.solve.residual_history.begin(),
+                                     first.residual_history.begin(), first.residual_history.end());
+  // What is missing is off by no more than twice the first solution's error: brightness less mean.
+  const double row_sum = std::max(1.0, grid.form_factors.row_sum_max);
+  for (Index k = 0; k < first.error_bound.size(); ++k) {
+    const double q = task.rho.col(k).maxCoeff() * row_sum;
+    grid.solve.error_bound[k] += (1.0 + 2.0 * q / (1.0 - q)) * first.error_bound[k];
+  }
 }
 
 const SmoothField& Prediction::Level::smooth() const {
@@ -125,19 +172,32 @@ SolveOutcome Prediction::outcome() const {
   return SolveOutcome::converged;
 }
 
-void Prediction::differentiate(const ExchangeOperator& exchange, const BandMatrix& rho,
-                               const SolveOptions& options, GridSolution& grid) const {
+void Prediction::differentiate(const ExchangeOperator& exchange, const GridTask& task,
+                               const Gather& gather, GridSolution& grid) const {
+  const BandMatrix& rho = task.rho;
   const SolvedSystem system{exchange, rho, grid.direct, grid.indirect};
   const auto surfaces = static_cast<Index>(distinct_scene_.surfaces.size());
+  SolveOptions quiet = task.solve;
+  quiet.on_progress = {};
   for (std::size_t m = 0; m < distinct_scene_.materials.size(); ++m) {
     std::vector<char> is_in_material(grid.mesh.size());
     for (std::size_t i = 0; i < grid.mesh.size(); ++i)
       is_in_material[i] =
           distinct_scene_.surfaces[grid.mesh.surface_of(grid.mesh.patches[i])].material == m;
     BandMatrix derivative, mean = BandMatrix::Zero(surfaces, rho.cols());
-    SolveOptions quiet = options;
-    quiet.on_progress = {};
     reflectance_sensitivity(system, is_in_material, quiet, derivative);
+    if (task.near_sources) {  // what they add has a derivative, too
+      BandMatrix share = BandMatrix::Zero(rho.rows(), rho.cols());
+      for (std::size_t i = 0; i < grid.mesh.size(); ++i)
+        if (is_in_material[i]) share.row(static_cast<Index>(i)).setOnes();
+      const BandMatrix rest = derivative - share.cwiseProduct(grid.direct);
+      BandMatrix more;
+      solve_radiosity(exchange, rho,
+                      rho.cwiseProduct(near_source_correction(grid.mesh, distinct_scene_, gather,
+                                                              grid.usable, share, rest)),
+                      quiet, more);
+      derivative += more;
+    }
     Eigen::VectorXd area = Eigen::VectorXd::Zero(surfaces);
     for (std::size_t i = 0; i < grid.mesh.size(); ++i) {
       if (!grid.usable[i]) continue;
@@ -177,11 +237,14 @@ Eigen::VectorXd Prediction::expand(const Eigen::VectorXd& distinct) const {
   return all;
 }
 
+bool Prediction::is_resolved(const PatchMesh& finest) {
+  return static_cast<double>(finest.size()) >=
+         kPatchesAPiece * static_cast<double>(finest.pieces.size());
+}
+
 bool Prediction::bound_is_reliable() const {
   if (fine().links) return false;  // what they leave out is an estimate
-  return !needs_.interreflection ||
-         static_cast<double>(fine().mesh.size()) >=
-             kPatchesAPiece * static_cast<double>(fine().mesh.pieces.size());
+  return !needs_.interreflection || is_resolved(fine().mesh);
 }
 
 BandMatrix Prediction::indirect_from_surfaces(const Level& level, const Vec3& point,

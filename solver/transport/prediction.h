@@ -27,10 +27,19 @@ struct GridTask {
   const BandMatrix& source;
   const FormFactorOptions& form_factors;
   const SolveOptions& solve;
+  /// What element means lack because near elements are not of one brightness, elements x bands,
+  /// from a first solution; empty if that is not wanted. See near_source_correction.
+  std::function<BandMatrix(const GridSolution& first)> near_sources;
 };
 
 /// Finds form factors and solution of one grid: fills all of it but mesh and direct light.
 using SolveGrid = std::function<void(const GridTask& task, GridSolution& grid)>;
+
+/// For whoever solves a grid: calls `solve(source, options)`, which fills reflected, indirect and
+/// summary, and, where near sources count, once more with what they add to the source.
+void solve_with_near_sources(
+    const GridTask& task, GridSolution& grid,
+    const std::function<void(const BandMatrix& source, const SolveOptions& options)>& solve);
 
 struct PredictOptions {
   std::size_t elements = 6000;  ///< of the fine grid, about
@@ -40,7 +49,11 @@ struct PredictOptions {
   /// Meshes of the three grids, 0 the coarsest, each finer than the one before; uniform if empty
   /// (then `elements` counts). See adapt_mesh.
   std::function<PatchMesh(int grid)> mesh_of_grid;
-  bool error_shares = false;   ///< solve the middle grid twice, to tell what part is the rays'
+  /// Correct element means for near elements that are not of one brightness, never with links.
+  /// Nothing said: where the finest grid is too coarse to extrapolate (bound_is_reliable);
+  /// elsewhere extrapolation takes the same error off, and more.
+  std::optional<bool> near_sources;
+  bool error_shares = false;   ///< solve the middle grid twice, to tell what part is the factors'
   bool sensitivities = false;  ///< of the fine grid to each material's reflectance
   SolveGrid solve_grid;        ///< instead of a matrix or links in this process; may be empty
   /// Told the finest grid's mesh and source, returns its SolveOptions::on_progress; may be empty.
@@ -51,11 +64,12 @@ struct PredictOptions {
 };
 
 /// Where the error comes from: area-weighted means over all surfaces, relative to the mean
-/// irradiance, of the worst band. They are not added: grids differ by their rays as well.
+/// irradiance, of the worst band. They are not added: grids differ by their form factors as well.
 struct ErrorShares {
   double discretisation = 0.0;  ///< |I_h - I_2h|, element by element of the next grid
-  double form_factors = 0.0;    ///< of two samplings of the next grid; the finest has more rays
-  double solver = 0.0;          ///< its bound, of all three grids
+  /// Of two samplings of the next grid, by other rays or from more points; the finest has more.
+  double form_factors = 0.0;
+  double solver = 0.0;  ///< its bound, of all three grids
 };
 
 /// One grid's solution; matrices are elements x bands, W m^-2 nm^-1.
@@ -153,9 +167,10 @@ class Prediction {
   };
 
   PatchMesh mesh_of(double edge_m, int split, const PredictOptions& options) const;
+  static bool is_resolved(const PatchMesh& finest);
   std::unique_ptr<Level> solve_level(double edge_m, int split, const PredictOptions& options) const;
-  void differentiate(const ExchangeOperator& exchange, const BandMatrix& rho,
-                     const SolveOptions& options, GridSolution& grid) const;
+  void differentiate(const ExchangeOperator& exchange, const GridTask& task, const Gather& gather,
+                     GridSolution& grid) const;
   ErrorShares find_error_shares(const Level& resampled) const;
   /// Bound of the indirect irradiance within each element, found when first asked for.
   const BandMatrix& indirect_bound() const;

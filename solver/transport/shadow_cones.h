@@ -2,31 +2,74 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <span>
 
+#include "transport/convex_occluder.h"
 #include "transport/form_factor.h"
-#include "transport/visible_parts.h"
 
 namespace truebox {
 
-/// The shadow pyramid of a blocker seen from one point, ready to be held against many sources.
+/// What a solid hides from one point, ready to be held against many sources: the intersection of
+/// half spaces, through the edges of its outline and behind the faces that the point sees.
 struct ShadowCone {
-  static constexpr int kMostEdges = 8;
+  static constexpr int kMostPlanes = 24;
+  enum class Hides { nothing, region, all };
 
-  std::array<Vec3, kMostEdges> outward;  ///< normals of its sides, not normalised
-  int edges = 0;
-  Vec3 near_normal = Vec3::Zero();  ///< of the blocker, towards the point
-  double distance_m = 0.0;          ///< of the point from the blocker's plane
+  /// Unit normals and offsets of the planes; hidden is what lies behind all. Filled up to a
+  /// multiple of four with planes that all is behind.
+  alignas(32) std::array<double, kMostPlanes> x, y, z, offset_m;
+  int count = 0;
 
-  /// False if the blocker is seen edge-on or has too many edges.
-  static bool make(const Vec3& point, const Blocker& blocker, ShadowCone& cone);
+  /// `all` from within the solid or from a face that looks into it. Region with count 0: too many
+  /// planes.
+  static Hides make(const Vec3& point, const Vec3& normal, const ConvexOccluder& solid,
+                    double tolerance_m, ShadowCone& cone);
+
+  double distance_m(int plane, const Vec3& v) const {
+    const auto p = static_cast<std::size_t>(plane);
+    return x[p] * v.x() + y[p] * v.y() + z[p] * v.z() - offset_m[p];
+  }
 };
 
-/// The hidden share of a small, far source seen from `point`, weighted with the kernel at the
-/// centroids of its hidden parts: exact outlines, relative error of second order in size over
-/// distance. The source lies wholly above the receiver's horizon. Negative if the parts became too
-/// many or too cornered for the fixed memory: ask VisibleParts then.
-double hidden_share(const Vec3& point, const Vec3& normal, const PlanarPolygon& source,
-                    std::span<const ShadowCone* const> cones);
+enum class ShadowSide { outside, inside, across };
+
+/// Whether a convex polygon lies in the shadow: `across` may still be outside, at a corner. Then
+/// bit p of `cuts` says that plane p of the cone has corners in front.
+struct ShadowTest {
+  ShadowSide side = ShadowSide::outside;
+  std::uint32_t cuts = 0;
+};
+ShadowTest test_shadow(const ShadowCone& cone, const PlanarPolygon& polygon);
+
+/// Convex parts of a convex polygon that no cone hides, in fixed memory. Reusable.
+class ShadowParts {
+ public:
+  ShadowParts();
+  ShadowParts(ShadowParts&&) noexcept;
+  ~ShadowParts();
+
+  /// False if the parts became too many or too cornered: ask VisibleParts then.
+  bool cut(std::span<const Vec3> source, std::span<const ShadowCone* const> cones);
+
+  /// What a single cone hides of the source, its planes `cuts` alone; negative as `cut` is false.
+  /// Otherwise as below.
+  double hidden_share(const PlanarPolygon& source, const ShadowCone& cone, std::uint32_t cuts,
+                      const Vec3& point, const Vec3& normal);
+
+  /// Of the last cut, from `point`: hidden share by the kernel at centroids of parts, exactly 0 and
+  /// 1 where nothing or all is hidden; relative error of second order in size over distance. The
+  /// source lies wholly above the receiver's horizon.
+  double hidden_share(const Vec3& point, const Vec3& normal, const Vec3& source_normal) const;
+
+  /// Of the last cut: what the element sees of the source, by Lambert's formula.
+  double visible_factor(const Vec3& point, const Vec3& normal) const;
+  /// The same of what is hidden.
+  double hidden_factor(const Vec3& point, const Vec3& normal) const;
+
+ private:
+  struct Memory;
+  std::unique_ptr<Memory> memory_;
+};
 
 }  // namespace truebox

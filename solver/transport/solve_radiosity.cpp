@@ -85,7 +85,7 @@ std::string SolveSummary::brief() const {
                      " passes over the form factors";
   if (bands_reduced > 0)
     text += "; " + std::to_string(bands_reduced) + " of " + std::to_string(error_bound.size()) +
-            " bands on the reduced basis of the others";
+            " bands on a reduced basis that they share";
   return text;
 }
 

@@ -5,16 +5,13 @@
 
 namespace truebox {
 
-/// Exchange areas that are never held: each pass over the matrix finds its rows anew, without rays
-/// (stream_form_factors), and forgets them. Memory is a row a thread and the radiosity of all bands
-/// instead of n^2 numbers; time is that of the form factors for every pass of the solver, doubled
-/// because no pair is mirrored. Rows are not scaled to close: `summary` says how far they are off,
-/// and that error is in the answer. Elements that lie under a surface are left out as by
-/// form_factors.
-FindExchange streamed_exchange();
-
-/// Processor time of a solve so, relative to the same with the matrix held: `passes` of the solver,
-/// one to see which rows close, over both halves.
-inline double streamed_slowdown(double passes) { return 2.0 * (passes + 1.0); }
+/// For PredictOptions: form factors of exact visibility that are found anew for every pass, the
+/// same numbers as the full matrix to the solver's digits. Memory is O(n) beside the mesh; every
+/// pass costs the time of two matrices, for nothing is mirrored. Closure is scaled as
+/// repair_closure does it, by the scale factors alone: x_i x_j S_ij on partly hidden pairs, found
+/// by Newton's method on log x, each step by conjugate gradients (Knight & Ruiz 2013). The summary
+/// counts the passes that this took. Bands are best solved together (SolveOptions::share_bands =
+/// false): a pass costs the same for one as for all. The request must outlive the exchange.
+FoundExchange streamed_exchange(const ExchangeRequest& request);
 
 }  // namespace truebox

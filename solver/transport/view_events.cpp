@@ -12,37 +12,39 @@ constexpr double kBelowSource = 1e-6;
 
 bool same(const Vec3& a, const Vec3& b, double tolerance) { return (a - b).norm() <= tolerance; }
 
-class EventCutter {
- public:
-  EventCutter(const PlanarPolygon& receiver, const PlanarPolygon& source,
-              std::span<const Blocker* const> blockers, std::size_t most_cells)
-      : receiver_(receiver),
-        source_(source),
-        blockers_(blockers),
-        most_cells_(most_cells),
-        size_(receiver.radius_m),
-        cells_{receiver.vertices} {}
+constexpr double kInOnePlane = 1e-9;  // sine of the angle to it
 
-  std::vector<Polygon> run() {
+class EventFinder {
+ public:
+  EventFinder(const PlanarPolygon& receiver, const PlanarPolygon& source)
+      : receiver_(receiver), source_(source) {}
+
+  std::vector<ViewEvent> run(std::span<const Blocker* const> blockers) {
+    blockers_ = blockers;
     for (const Blocker* blocker : blockers_) {
-      cut_by_plane(*blocker);
+      cut_by_plane(blocker->plane);
       cut_by_blocker(*blocker);
     }
-    return std::move(cells_);
+    return std::move(events_);
+  }
+
+  std::vector<ViewEvent> run(std::span<const ConvexOccluder* const> solids) {
+    for (const ConvexOccluder* solid : solids) cut_by_solid(*solid);
+    return std::move(events_);
   }
 
  private:
   double height(const Vec3& v) const { return receiver_.plane.distance_m(v); }
 
-  void cut_by_plane(const Blocker& blocker) {
+  void cut_by_plane(const Plane& plane) {
     Polygon crossing;
     const Polygon& p = receiver_.vertices;
     for (std::size_t k = 0; k < p.size(); ++k) {
       const Vec3 &a = p[k], &b = p[(k + 1) % p.size()];
-      const double h = blocker.plane.distance_m(a), g = blocker.plane.distance_m(b);
+      const double h = plane.distance_m(a), g = plane.distance_m(b);
       if ((h > 0.0) != (g > 0.0)) crossing.push_back(a + h / (h - g) * (b - a));
     }
-    if (crossing.size() == 2) cut(crossing[0], crossing[1]);
+    if (crossing.size() == 2) events_.push_back({crossing[0], crossing[1], false});
   }
 
   // An edge that two blockers share inside their common outline is no outline of the shadow.
@@ -74,26 +76,70 @@ class EventCutter {
     const Polygon& s = source_.vertices;
     for (std::size_t k = 0; k < n; ++k) {
       if (!inner[k])
-        for (const Vec3& q : s) shadow_of_edge(q, p[k], p[(k + 1) % n]);
+        for (std::size_t l = 0; l < s.size(); ++l)
+          shadow_of_edge(s[l], p[k], p[(k + 1) % n], edge_in_plane(s, l, p[k], p[(k + 1) % n]));
       if (inner[k] && inner[(k + n - 1) % n]) continue;
       for (std::size_t l = 0; l < s.size(); ++l)
-        source_edge_through(p[k], s[l], s[(l + 1) % s.size()]);
+        source_edge_through(p[k], s[l], s[(l + 1) % s.size()],
+                            edge_in_plane(p, k, s[l], s[(l + 1) % s.size()]));
     }
   }
 
+  // Whether an edge at corner k of a polygon lies in the plane of that corner and a-b.
+  static bool edge_in_plane(const Polygon& polygon, std::size_t k, const Vec3& a, const Vec3& b) {
+    const std::size_t n = polygon.size();
+    const Vec3 normal = (a - polygon[k]).cross(b - polygon[k]).normalized();
+    for (const std::size_t other : {(k + 1) % n, (k + n - 1) % n})
+      if (std::abs(normal.dot((polygon[other] - polygon[k]).normalized())) < kInOnePlane)
+        return true;
+    return false;
+  }
+
+  // Bit 0: some of the receiver sees the front of the plane, bit 1: some sees its back.
+  int sides_of(const Plane& plane) const {
+    int sides = 0;
+    for (const Vec3& v : receiver_.vertices) sides |= plane.distance_m(v) > 0.0 ? 1 : 2;
+    return sides;
+  }
+
+  void cut_by_solid(const ConvexOccluder& solid) {
+    std::vector<int> sides;
+    for (const Plane& face : solid.faces) {
+      sides.push_back(sides_of(face));
+      if (sides.back() == 3) cut_by_plane(face);
+    }
+    const Polygon& s = source_.vertices;
+    std::vector<Vec3> corners;
+    for (const ConvexOccluder::Edge& edge : solid.edges) {
+      const int left = sides[edge.left], right = sides[edge.right];
+      if (left == right && left != 3) continue;  // no outline from anywhere
+      for (const Vec3& q : s) shadow_of_edge(q, edge.a, edge.b, false);
+      corners.push_back(edge.a);
+      corners.push_back(edge.b);
+    }
+    const auto before = [](const Vec3& a, const Vec3& b) {
+      return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+    };
+    std::sort(corners.begin(), corners.end(), before);
+    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+    for (const Vec3& corner : corners)
+      for (std::size_t l = 0; l < s.size(); ++l)
+        source_edge_through(corner, s[l], s[(l + 1) % s.size()], false);
+  }
+
   // From the source's corner q, edge a-b casts its shadow on the receiver.
-  void shadow_of_edge(const Vec3& q, Vec3 a, Vec3 b) {
+  void shadow_of_edge(const Vec3& q, Vec3 a, Vec3 b, bool of_two_edges) {
     const double hq = height(q), top = hq * (1.0 - kBelowSource);
     if (hq <= 0.0 || !keep_heights(a, b, 0.0, top)) return;
-    cut(projected(q, hq, a), projected(q, hq, b));
+    events_.push_back({projected(q, hq, a), projected(q, hq, b), of_two_edges});
   }
 
   // Edge q-r of the source as the receiver sees it behind the blocker's corner b.
-  void source_edge_through(const Vec3& b, Vec3 q, Vec3 r) {
+  void source_edge_through(const Vec3& b, Vec3 q, Vec3 r, bool of_two_edges) {
     const double hb = height(b);
     if (hb < 0.0 || !keep_heights(q, r, hb / (1.0 - kBelowSource), HUGE_VAL)) return;
     if (height(q) > 0.0 && height(r) > 0.0)
-      cut(projected(q, height(q), b), projected(r, height(r), b));
+      events_.push_back({projected(q, height(q), b), projected(r, height(r), b), of_two_edges});
   }
 
   // Cuts the segment to heights in [low, high]; false if nothing is left.
@@ -120,6 +166,22 @@ class EventCutter {
     return b + hb / (height_q - hb) * (b - q);
   }
 
+  const PlanarPolygon& receiver_;
+  const PlanarPolygon& source_;
+  std::span<const Blocker* const> blockers_;
+  std::vector<ViewEvent> events_;
+};
+
+class EventCutter {
+ public:
+  EventCutter(const PlanarPolygon& receiver, std::size_t most_cells)
+      : receiver_(receiver),
+        most_cells_(most_cells),
+        size_(receiver.radius_m),
+        cells_{receiver.vertices} {}
+
+  const std::vector<Polygon>& cells() const { return cells_; }
+
   void cut(const Vec3& from, const Vec3& to) {
     const Vec3 along = to - from;
     const double length = along.norm();
@@ -136,6 +198,7 @@ class EventCutter {
     }
   }
 
+ private:
   bool crosses_inside(const Polygon& cell, const Vec3& from, const Vec3& along,
                       double length) const {
     double t0 = 0.0, t1 = 1.0;
@@ -156,21 +219,38 @@ class EventCutter {
   }
 
   const PlanarPolygon& receiver_;
-  const PlanarPolygon& source_;
-  std::span<const Blocker* const> blockers_;
   std::size_t most_cells_;
   double size_;
   std::vector<Polygon> cells_;
   Polygon left_, right_;
 };
 
+std::vector<Polygon> cells_between(const PlanarPolygon& receiver,
+                                   const std::vector<ViewEvent>& events, std::size_t most_cells) {
+  EventCutter cutter(receiver, most_cells);
+  for (const ViewEvent& event : events) cutter.cut(event.from, event.to);
+  return cutter.cells();
+}
+
 }  // namespace
+
+std::vector<ViewEvent> view_events(const PlanarPolygon& receiver, const PlanarPolygon& source,
+                                   std::span<const Blocker* const> blockers) {
+  return EventFinder(receiver, source).run(blockers);
+}
 
 std::vector<Polygon> cells_between_events(const PlanarPolygon& receiver,
                                           const PlanarPolygon& source,
                                           std::span<const Blocker* const> blockers,
                                           std::size_t most_cells) {
-  return EventCutter(receiver, source, blockers, most_cells).run();
+  return cells_between(receiver, view_events(receiver, source, blockers), most_cells);
+}
+
+std::vector<Polygon> cells_between_events(const PlanarPolygon& receiver,
+                                          const PlanarPolygon& source,
+                                          std::span<const ConvexOccluder* const> solids,
+                                          std::size_t most_cells) {
+  return cells_between(receiver, EventFinder(receiver, source).run(solids), most_cells);
 }
 
 }  // namespace truebox

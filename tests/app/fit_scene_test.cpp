@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "image/image_file.h"
@@ -70,6 +71,37 @@ TEST(FitSceneProgram, ExitsWithFiveAndNamesTheNullDirection) {
   EXPECT_THAT(result.text, HasSubstr("emission scale"));
   EXPECT_THAT(result.text, HasSubstr("all gains"));
   EXPECT_THAT(result.text, HasSubstr("no u"));
+}
+
+TEST(FitSceneProgram, EndsCleanlyAtCtrlCDuringFormFactors) {
+  // So many elements that form factors take far longer than the two seconds until SIGINT.
+  std::string path = measurement("");
+  std::ifstream file(path);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  text.replace(text.find("elements = 400"), 14, "elements = 12000");
+  write_file_atomically(path, text);
+  const std::string json = scratch_path("stopped.json"), directory = scratch_path("stopped");
+  const CommandOutcome result =
+      run_command("timeout --preserve-status -s INT 2 '" TRUEBOX_PROGRAM "' fit " + path + " -o " +
+                  json + " --report " + directory);
+  EXPECT_EQ(result.code, 5) << result.text;
+  EXPECT_THAT(result.text, HasSubstr("stopped by the user before there was a fit"));
+  EXPECT_FALSE(std::filesystem::exists(json));
+  EXPECT_FALSE(std::filesystem::exists(directory));
+}
+
+TEST(FitSceneProgram, ReportsTheCameraWithItsUnits) {
+  const std::string json = scratch_path("camera.json");
+  const CommandOutcome result =
+      truebox("fit " + measurement("[cameras.front]\npose = { fit = \"free\" }\n") + " -o " + json);
+  EXPECT_EQ(result.code, 0) << result.text;
+  std::ifstream file(json);
+  const auto found = nlohmann::json::parse(file);
+  std::map<std::string, std::string> units;
+  for (const auto& p : found["parameters"]) units[p["name"]] = p["unit"];
+  EXPECT_EQ(units["camera front, tilt"], "rad");
+  EXPECT_EQ(units["camera front, forward"], "mm");
+  EXPECT_EQ(units["reflectance white, 552 nm"], "1");
 }
 
 TEST(FitSceneProgram, ExitsWithFourAtAMistake) {

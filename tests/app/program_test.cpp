@@ -467,6 +467,49 @@ TEST_F(Program, SolvesToATargetError) {
   EXPECT_EQ(run("solve " + room() + " --target-error half").code, 64);
 }
 
+// Polynomials and constants solve the same equation: they differ by no more than both bounds.
+TEST_F(Program, SolvesOnPolynomialsWithinBothBounds) {
+  const Outcome smooth =
+      run("solve " + room() + " --basis quadratic --elements 60 -o " + file("p.json"));
+  ASSERT_EQ(smooth.code, 0) << smooth.text;
+  ASSERT_EQ(run("solve " + room() + " --elements 500 -o " + file("c.json")).code, 0);
+  const auto p = nlohmann::json::parse(text_of(file("p.json"))).at("surfaces");
+  const auto c = nlohmann::json::parse(text_of(file("c.json"))).at("surfaces");
+  ASSERT_EQ(p.size(), 3u);
+  for (std::size_t s = 0; s < p.size(); ++s)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto number = [&](const nlohmann::json& surfaces, const char* name) {
+        return surfaces.at(s).at(name).at(k).get<double>();
+      };
+      const double bound = number(p, "radiosity_error_bound");
+      EXPECT_LT(bound, 1e-3 * number(p, "radiosity"));
+      EXPECT_NEAR(number(p, "radiosity"), number(c, "radiosity"),
+                  bound + number(c, "radiosity_error_bound"));
+    }
+}
+
+TEST_F(Program, RefusesPolynomialsWhereSurfacesHideEachOther) {
+  const Outcome hidden = run("solve '" + kScene + "' --basis linear");
+  EXPECT_EQ(hidden.code, 4);
+  EXPECT_THAT(hidden.text, HasSubstr("without occlusion"));
+  EXPECT_EQ(run("solve " + room() + " --basis linear --adaptive").code, 4);
+  EXPECT_EQ(run("solve " + room() + " --basis septic").code, 64);
+}
+
+TEST_F(Program, StreamsFormFactorsToTheAnswerOfTheMatrix) {
+  const Outcome none =
+      run("solve " + room() + " --elements 60 --form-factors streamed -o " + file("s.json"));
+  ASSERT_EQ(none.code, 0) << none.text;
+  EXPECT_THAT(none.text, HasSubstr("factors not kept"));
+  ASSERT_EQ(run("solve " + room() + " --elements 60 -o " + file("m.json")).code, 0);
+  const auto s = nlohmann::json::parse(text_of(file("s.json"))).at("surfaces");
+  const auto m = nlohmann::json::parse(text_of(file("m.json"))).at("surfaces");
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double of_matrix = m.at(0).at("radiosity").at(k).get<double>();
+    EXPECT_NEAR(s.at(0).at("radiosity").at(k).get<double>(), of_matrix, 1e-5 * of_matrix);
+  }
+}
+
 TEST_F(Program, OptionsOfTheOtherMethodAreWrongUsage) {
   for (const std::string options :
        {"--method path --error-bound b.exr", "--method path --gather-above 1", "--variance v.exr",

@@ -15,9 +15,9 @@ using Modules = std::set<std::string>;
 // Modules that each module may include, itself aside. Left to right; solver and reference never
 // meet, only calibration and reports see both.
 const std::map<std::string, Modules>& allowed_modules() {
-  static const Modules kSolver = {"radiometry", "image",     "scene",     "rays",
-                                  "mesh",       "transport", "hierarchy", "path_tracer",
-                                  "sensor",     "adaptive",  "planning",  "export"};
+  static const Modules kSolver = {
+      "radiometry",  "image",  "scene",         "rays",     "mesh",     "transport", "hierarchy",
+      "path_tracer", "sensor", "discontinuity", "adaptive", "planning", "export"};
   static const Modules kReference = {"provenance", "analytic", "readings"};
   static const auto join = [](Modules a, const Modules& b) {
     a.insert(b.begin(), b.end());
@@ -39,10 +39,12 @@ const std::map<std::string, Modules>& allowed_modules() {
       {"solver/distributed", {"radiometry", "image", "scene", "rays", "mesh", "transport"}},
       {"solver/hierarchy", {"radiometry", "image", "scene", "rays", "mesh", "transport"}},
       {"solver/sensor", {"radiometry", "image", "scene", "mesh", "transport"}},
-      {"solver/adaptive", {"radiometry", "image", "scene", "mesh", "transport", "sensor"}},
+      {"solver/discontinuity", {"radiometry", "image", "scene", "rays", "mesh", "transport"}},
+      {"solver/adaptive",
+       {"radiometry", "image", "scene", "mesh", "transport", "sensor", "discontinuity"}},
       {"solver/planning",
        {"radiometry", "image", "scene", "rays", "mesh", "path_tracer", "transport", "hierarchy",
-        "sensor", "adaptive"}},
+        "sensor", "discontinuity", "adaptive"}},
       {"solver/export", {"radiometry", "image", "scene", "mesh", "transport"}},
       {"reference/provenance", {"radiometry", "image"}},
       {"reference/analytic", {"radiometry", "image", "provenance"}},
@@ -70,6 +72,7 @@ struct ThirdParty {
 const std::vector<ThirdParty>& third_parties() {
   static const std::vector<ThirdParty> kTable = {
       {"embree3/", {"solver/rays"}},
+      {"geos_c.h", {"solver/discontinuity"}},
       {"petsc", {"solver/distributed"}},
       {"mpi.h", {"solver/distributed"}, true},  // in a header that no other folder includes
       {"Imf", {"solver/image"}},

@@ -227,7 +227,7 @@ TEST(SurfaceMeans, WeighUnequalElementsByTheirAreas) {
       2.0 / M_PI *
       (0.5 * std::log(4.0 / 3.0) + 2.0 * root * std::atan(1.0 / root) - 2.0 * std::atan(1.0));
   double area = 0.0, weights = 0.0;
-  for (const auto& [element, weight] : model.blocks()[4].weights) {
+  for (const auto& [element, weight] : model.blocks()[4].parts[0].weights) {
     EXPECT_NEAR(weight, model.mesh().patches[element].area_m2, 1e-14);  // of a floor of 1 m^2
     area += model.mesh().patches[element].area_m2;
     weights += weight;

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <mutex>
+#include <numeric>
 #include <random>
 #include <stdexcept>
 
@@ -93,14 +94,11 @@ TEST(PairKernel, HoldsItsTolerance) {
   // Every pair of a cube's patches, near and far, against the closed form.
   const Scene cube = tiny::cube(1.0, 0.0);
   const PatchMesh mesh = uniform_mesh(cube, 0.2);
-  std::vector<PlanarPolygon> patches;
-  Polygon polygon;
-  for (const Patch& patch : mesh.patches) {
-    mesh.polygon_of(patch, polygon);
-    patches.emplace_back(polygon);
-  }
+  const std::vector<PlanarPolygon> patches = planar_polygons(mesh);
+  std::vector<std::uint32_t> order(patches.size());
+  std::iota(order.begin(), order.end(), 0u);
   for (double tolerance : {1e-2, 1e-4, 1e-7}) {
-    const PairKernel kernel(patches, tolerance);
+    const PairKernel kernel(patches, order, tolerance, 1e-12);
     for (std::uint32_t i = 0; i < patches.size(); i += 3)
       for (std::uint32_t j = 0; j < patches.size(); ++j) {
         if (mesh.patches[i].piece == mesh.patches[j].piece) continue;
@@ -110,6 +108,105 @@ TEST(PairKernel, HoldsItsTolerance) {
   }
 }
 
+TEST(PairKernel, FindsTheSameBitsOneByOneAndInRuns) {
+  // The other walls' patches in runs of a length that eight does not divide, from below and above.
+  const Scene cube = tiny::cube(1.0, 0.0);
+  const PatchMesh mesh = uniform_mesh(cube, 0.21);
+  const std::vector<PlanarPolygon> patches = planar_polygons(mesh);
+  std::vector<std::uint32_t> order(patches.size());
+  std::iota(order.begin(), order.end(), 0u);
+  for (double tolerance : {1e-2, 1e-4, 1e-7}) {
+    const PairKernel kernel(patches, order, tolerance, 1e-12);
+    for (std::uint32_t i = 0; i < patches.size(); i += 7)
+      for (std::size_t p = 0; p < mesh.pieces.size(); ++p) {
+        if (p == mesh.patches[i].piece) continue;
+        const Piece& piece = mesh.pieces[p];
+        std::vector<double> run(piece.patch_count - 1);
+        kernel.exchange_areas_m2(i, piece.first_patch, true, run);
+        for (std::uint32_t k = 0; k < run.size(); ++k)
+          EXPECT_EQ(run[k], kernel.exchange_area_m2(i, piece.first_patch + k)) << i << ' ' << k;
+      }
+  }
+}
+
+// The faces of a box from number `first` on, normals outward; 0 is the floor.
+std::vector<Blocker> box_faces(const Vec3& low, const Vec3& high, std::size_t first = 0) {
+  Scene scene = tiny::grey_scene(1.0);
+  tiny::add_box(scene, "box", low, high, false);
+  std::vector<Blocker> faces;
+  for (std::size_t k = first; k < 6; ++k) {
+    const Polygon& p = scene.surfaces[k].pieces[0];
+    faces.push_back({p, plane_of(p)});
+  }
+  return faces;
+}
+
+TEST(ConvexOccluders, AreABlockWithOrWithoutOneFace) {
+  const auto closed = box_faces({0, 0, 0}, {1, 2, 3});
+  ASSERT_EQ(convex_occluders(closed, 1e-9).size(), 1u);
+  EXPECT_EQ(convex_occluders(closed, 1e-9)[0].edges.size(), 12u);
+  const auto on_the_floor = box_faces({0, 0, 0}, {1, 2, 3}, 1);
+  ASSERT_EQ(convex_occluders(on_the_floor, 1e-9).size(), 1u);
+  EXPECT_EQ(convex_occluders(on_the_floor, 1e-9)[0].faces.size(), 6u) << "the missing one, too";
+  EXPECT_EQ(convex_occluders(box_faces({0, 0, 0}, {1, 2, 3}, 2), 1e-9).size(), 4u)
+      << "two missing: light passes through";
+  auto with_something_inside = on_the_floor;
+  with_something_inside.push_back(
+      {{{0.2, 0.2, 1}, {0.4, 0.2, 1}, {0.4, 0.4, 1}}, {Vec3::UnitZ(), 1.0}});
+  EXPECT_EQ(convex_occluders(with_something_inside, 1e-9).size(), 6u)
+      << "from inside one could look out where the face is missing";
+  auto pulled = closed;
+  for (Blocker& face : pulled)
+    for (Vec3& v : face.polygon)
+      if (v == Vec3(1, 2, 3)) v = Vec3(1, 2, 3.5);
+  EXPECT_EQ(convex_occluders(pulled, 1e-9).size(), 6u) << "not convex any more";
+}
+
+TEST(ConvexOccluders, HideWhatNoSingleFaceDoes) {
+  // None and full must hold for every segment of the shaft.
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0), unit(0.0, 1.0);
+  const auto faces = box_faces({-0.3, -0.2, -0.25}, {0.35, 0.3, 0.2});
+  const auto solids = convex_occluders(faces, 1e-12);
+  int none = 0, full = 0, full_by_no_face = 0;
+  const auto meets = [&](const Vec3& a, const Vec3& b) {
+    double enter = 0.0, leave = 1.0;
+    for (const Plane& face : solids[0].faces) {
+      const double from = face.distance_m(a), to = face.distance_m(b);
+      if (from > 0.0 && to > 0.0) return false;
+      if (from > 0.0) enter = std::max(enter, from / (from - to));
+      if (to > 0.0) leave = std::min(leave, from / (from - to));
+    }
+    return enter < leave;
+  };
+  for (int trial = 0; trial < 4000; ++trial) {
+    const auto square = [&](double x) {
+      const Vec3 c(x, 0.4 * uniform(random), 0.4 * uniform(random));
+      const double s = 0.02 + 0.2 * unit(random);
+      return Polygon{c, c + Vec3(0, s, 0), c + Vec3(0, s, s), c + Vec3(0, 0, s)};
+    };
+    const Polygon a = square(-1.0), b = square(1.0);
+    const Plane plane_a{Vec3::UnitX(), -1.0}, plane_b{-Vec3::UnitX(), -1.0};
+    const ShaftOcclusion found = shaft_occlusion(a, plane_a, b, plane_b, solids[0], 1e-12);
+    if (found == ShaftOcclusion::partial) continue;
+    for (int k = 0; k < 20; ++k) {
+      const auto point_of = [&](const Polygon& p) -> Vec3 {
+        return p[0] + unit(random) * (p[1] - p[0]) + unit(random) * (p[3] - p[0]);
+      };
+      EXPECT_EQ(meets(point_of(a), point_of(b)), found == ShaftOcclusion::full) << trial;
+    }
+    none += found == ShaftOcclusion::none;
+    if (found != ShaftOcclusion::full) continue;
+    ++full;
+    full_by_no_face += std::none_of(faces.begin(), faces.end(), [&](const Blocker& face) {
+      return shaft_occlusion(a, plane_a, b, plane_b, face, 1e-12) == ShaftOcclusion::full;
+    });
+  }
+  EXPECT_GT(none, 100);
+  EXPECT_GT(full, 100);
+  EXPECT_GT(full_by_no_face, 10);
+}
+
 TEST(ShadowCones, AgreeWithExactPartsFarAway) {
   // A small source far away behind random triangles; the kernel at centroids is of second order in
   // size over distance, here (0.2 / 2)^2.
@@ -117,6 +214,7 @@ TEST(ShadowCones, AgreeWithExactPartsFarAway) {
   std::uniform_real_distribution<double> uniform(-0.3, 0.3);
   const PlanarPolygon source(Polygon{{0, 0, 2}, {0, 0.2, 2}, {0.2, 0.2, 2}, {0.2, 0, 2}});
   VisibleParts parts;
+  ShadowParts shadow;
   const Vec3 point = Vec3::Zero(), normal = Vec3::UnitZ();
   int partly = 0;
   for (int trial = 0; trial < 500; ++trial) {
@@ -127,19 +225,35 @@ TEST(ShadowCones, AgreeWithExactPartsFarAway) {
         p.push_back({uniform(random), uniform(random), 1 + uniform(random)});
       blockers.push_back({p, plane_of(p)});
     }
+    const auto solids = convex_occluders(blockers, 1e-12);
     std::vector<ShadowCone> cones(3);
     std::vector<const ShadowCone*> active;
     std::vector<const Blocker*> all;
     for (std::size_t k = 0; k < 3; ++k) {
       all.push_back(&blockers[k]);
-      if (ShadowCone::make(point, blockers[k], cones[k])) active.push_back(&cones[k]);
+      if (ShadowCone::make(point, normal, solids[k], 1e-12, cones[k]) == ShadowCone::Hides::region)
+        active.push_back(&cones[k]);
     }
     double seen = 0.0;
     for (const Polygon& part : parts(point, source.vertices, source.plane, all))
       seen += point_to_polygon(point, normal, part);
-    const double exact = 1.0 - seen / point_to_polygon(point, normal, source.vertices);
-    const double found = hidden_share(point, normal, source, active);
-    ASSERT_GE(found, 0.0);
+    const double whole = point_to_polygon(point, normal, source.vertices);
+    const double exact = 1.0 - seen / whole;
+    ASSERT_TRUE(shadow.cut(source.vertices, active));
+    const double found = shadow.hidden_share(point, normal, source.plane.normal);
+    EXPECT_NEAR(shadow.visible_factor(point, normal), seen, 1e-14 * whole);
+    for (const ShadowCone* cone : active) {
+      const ShadowTest test = test_shadow(*cone, source);
+      ASSERT_TRUE(shadow.cut(source.vertices, {&cone, 1}));
+      const double alone = shadow.hidden_share(point, normal, source.plane.normal);
+      if (test.side == ShadowSide::outside) {
+        EXPECT_EQ(alone, 0.0) << trial;
+      } else if (test.side == ShadowSide::inside) {
+        EXPECT_EQ(alone, 1.0) << trial;
+      } else {
+        EXPECT_NEAR(shadow.hidden_share(source, *cone, test.cuts, point, normal), alone, 0.01);
+      }
+    }
     EXPECT_NEAR(found, exact, 0.01) << trial;
     if (exact < 1e-12) {
       EXPECT_EQ(found, 0.0);

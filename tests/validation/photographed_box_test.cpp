@@ -117,7 +117,7 @@ struct Bleeding {
 Bleeding bleeding_on(const std::string& surface, const SceneMeasurement& m, const SceneFit& fit) {
   std::map<std::size_t, std::array<const FittedReading*, 2>> pairs;
   for (const FittedReading& r : fit.readings)
-    if (r.plane < 2 && m.scene->surfaces[m.model->blocks()[r.block].surface].name == surface)
+    if (r.plane < 2 && m.scene().surfaces[m.model().blocks()[r.block].surface].name == surface)
       pairs[r.block][r.plane] = &r;
   std::vector<double> seen, left;
   for (const auto& [block, rg] : pairs) {

@@ -74,6 +74,7 @@ TEST(AdaptMesh, NamesTheGoalsThereAre) {
   } catch (const std::invalid_argument& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("surface:roof"));
     EXPECT_THAT(error.what(), testing::HasSubstr("surface:cube 5"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("parameter:grey"));
   }
 }
 
@@ -110,6 +111,89 @@ TEST(PredictAdaptively, HoldsItsBoundOnCertifiedMeansAndServesItsGoal) {
   }
 }
 
+// A room with a red wall: floor 0, ceiling 1 (lamp), walls 2 to 5 of which 5 is red.
+Scene room_with_red_wall(double red = 0.5) {
+  Scene scene = tiny::cube(1.0, 0.7);
+  scene.materials.push_back({"lamp", Reflectance(1, 0.7), RadiantExitance(1, 1.0)});
+  scene.materials.push_back({"red", Reflectance(1, red), RadiantExitance(1, 0.0)});
+  scene.surfaces[1].material = 1;
+  scene.surfaces[5].material = 2;
+  return scene;
+}
+
+// Mean irradiance of each element of a mesh as another prediction knows it; 0 where nothing is lit.
+Eigen::VectorXd means_over(const PatchMesh& mesh, const Prediction& prediction) {
+  Eigen::VectorXd means = Eigen::VectorXd::Zero(static_cast<Index>(mesh.size()));
+  Polygon polygon;
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    mesh.polygon_of(mesh.patches[i], polygon);
+    if (const auto mean = prediction.mean_irradiance_over(polygon))
+      means[static_cast<Index>(i)] = mean->value[0];
+  }
+  return means;
+}
+
+// What a least-squares fit of the red wall's reflectance to relative radiosities makes of a
+// prediction's errors; lamps are not observed.
+double fitted_error(const Prediction& prediction, const Prediction& truth, const Prediction& dim,
+                    const Prediction& bright, double ln_change) {
+  const PatchMesh& mesh = prediction.fine().mesh;
+  const Eigen::VectorXd exact = means_over(mesh, truth), less = means_over(mesh, dim),
+                        more = means_over(mesh, bright);
+  double change = 0.0, square = 0.0;
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const auto row = static_cast<Index>(i);
+    const Surface& surface = prediction.scene().surfaces[mesh.surface_of(mesh.patches[i])];
+    if (surface.material == 1 || !prediction.fine().usable[i] || exact[row] <= 0.0) continue;
+    const double own = surface.material == 2 ? 1.0 : 0.0;
+    const double s = own + std::log(more[row] / less[row]) / ln_change;
+    const double computed = prediction.fine().direct(row, 0) + prediction.fine().indirect(row, 0);
+    change += mesh.patches[i].area_m2 * s * (computed / exact[row] - 1.0);
+    square += mesh.patches[i].area_m2 * s * s;
+  }
+  return change / square;
+}
+
+TEST(PredictAdaptively, ServesAFittedReflectance) {
+  const Scene scene = room_with_red_wall(), brighter = room_with_red_wall(0.55);
+  PredictOptions options;
+  options.form_factors.method = FormFactorMethod::exact_visibility;
+  options.elements = 3000;
+  const Prediction truth(scene, options);
+  options.elements = 500;
+  const Prediction dim(scene, options), bright(brighter, options);
+  options.elements = 600;
+  std::vector<double> error;
+  for (const char* goal : {"everywhere", "parameter:red"}) {
+    const auto prediction = predict_adaptively(scene, options, goal_of_name(goal, scene));
+    error.push_back(std::abs(fitted_error(*prediction, truth, dim, bright, std::log(0.55 / 0.5))));
+    std::printf("%s: a fit finds the red wall's reflectance off by %.2g %%\n", goal,
+                100.0 * error.back());
+  }
+  EXPECT_LT(error[1], 0.75 * error[0]);  // half was seen, with 1000 elements too
+}
+
+TEST(DualSource, OfAParameterReadsBackAChangeOfItsReflectance) {
+  const Scene scene = room_with_red_wall();
+  const PatchMesh mesh = uniform_mesh(scene, 0.25);
+  const auto n = static_cast<Index>(mesh.size());
+  const std::vector<char> counts(mesh.size(), 1);
+  BandMatrix irradiance(n, 1), sensitivity(n, 1);
+  for (Index i = 0; i < n; ++i) {
+    irradiance(i, 0) = 1.0 + 0.1 * static_cast<double>(i % 7);
+    sensitivity(i, 0) = 0.3 * static_cast<double>(i % 5);  // dB / d ln rho_m : rho_i
+  }
+  const SmoothField places(mesh, counts, irradiance);
+  std::mt19937_64 random(1);
+  const BandMatrix q = dual_source(goal_of_name("parameter:red", scene), mesh, counts, irradiance,
+                                   places, sensitivity, random);
+  double change = 0.0;  // what a reflectance larger by 1 % does to every B_i, seen as dE_i
+  for (Index i = 0; i < n; ++i)
+    change +=
+        mesh.patches[static_cast<std::size_t>(i)].area_m2 * q(i, 0) * 0.01 * sensitivity(i, 0);
+  EXPECT_NEAR(change, 0.01, 1e-14);
+}
+
 TEST(PredictAdaptively, HoldsItsBoundAtPathTracedPointsOfTheCornellBox) {
   const Scene scene = cornell_box_in_seven_bands();
   PredictOptions options;
@@ -121,6 +205,22 @@ TEST(PredictAdaptively, HoldsItsBoundAtPathTracedPointsOfTheCornellBox) {
   ASSERT_GT(checks.size(), 200u);
   for (const AccuracyCheck& check : checks) outside += !check.passed();
   // Own bound and 3 standard errors: noise alone puts 0.3 % of them outside.
+  EXPECT_LE(static_cast<double>(outside), 0.01 * static_cast<double>(checks.size()));
+}
+
+// Elements that follow lines of light: triangles and quads of any shape.
+TEST(PredictAlongDiscontinuities, HoldsItsBoundAtPathTracedPointsOfTheCornellBox) {
+  const Scene scene = cornell_box_in_seven_bands();
+  PredictOptions options;
+  options.elements = 1500;
+  options.form_factors.method = FormFactorMethod::exact_visibility;
+  FollowedLines followed;
+  const auto prediction = predict_along_discontinuities(scene, options, &followed);
+  ASSERT_EQ(prediction->outcome(), SolveOutcome::converged);
+  EXPECT_GT(followed.of_order[2], 20u);
+  std::size_t outside = 0;
+  const auto checks = check_cornell_box_probes(TRUEBOX_REFERENCE_DIR, *prediction);
+  for (const AccuracyCheck& check : checks) outside += !check.passed();
   EXPECT_LE(static_cast<double>(outside), 0.01 * static_cast<double>(checks.size()));
 }
 

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "support/cornell_box.h"
+#include "support/tiny_scenes.h"
 #include "transport/prediction.h"
 
 namespace truebox {
@@ -64,6 +65,23 @@ TEST(PredictionBound, CoversTheDifferenceOfTwoPredictions) {
   EXPECT_GE(share, kCoverage);
   EXPECT_LE(worst, kWorst);
   EXPECT_LT(bound_sum / value_sum, 0.1) << "a bound so wide says nothing";
+}
+
+// Every grid makes the same error where the form factors' tolerance is coarser than the grids'
+// difference: in a furnace, whose radiosity is E / (1 - rho) everywhere, all of it.
+TEST(ErrorBound, HoldsWhatTheKernelsToleranceDoesToAFurnace) {
+  constexpr double kRho = 0.9;
+  const Scene scene = tiny::cube(1.0, kRho, 1.0);
+  PredictOptions options;
+  options.elements = 400;
+  options.form_factors.relative_tolerance = 1e-3;
+  const Prediction prediction(scene, options);
+  ASSERT_EQ(prediction.outcome(), SolveOutcome::converged);
+  const BandMatrix error = (prediction.radiosity().array() - 1.0 / (1.0 - kRho)).abs();
+  const BandMatrix bound = prediction.radiosity_bound();
+  EXPECT_GT(error.maxCoeff(), 1e-6) << "too good to show anything";
+  for (Eigen::Index i = 0; i < error.rows(); ++i) EXPECT_LE(error(i, 0), bound(i, 0)) << i;
+  EXPECT_LE(bound.maxCoeff(), 1e-2 / (1.0 - kRho)) << "a bound so wide says nothing";
 }
 
 }  // namespace

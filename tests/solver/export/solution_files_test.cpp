@@ -6,6 +6,7 @@
 #include <set>
 
 #include "export/solution_surface.h"
+#include "mesh/hanging_vertices.h"
 #include "solver/export/glb_reader.h"
 #include "support/tiny_scenes.h"
 
@@ -63,6 +64,28 @@ TEST(SolutionSurface, LeavesOutWhatLiesUnderABlock) {
     floor_m2 += 0.5 * (at(1) - at(0)).cross(at(2) - at(0)).norm();
   }
   EXPECT_NEAR(floor_m2, 1.0 - 0.27 * 0.29, 1e-9);
+}
+
+// Lines of contact end inside elements, whose neighbours' corners hang in their edges: those are
+// vertices of both, so that no vertex lies inside an edge of a triangle.
+TEST(SolutionSurface, HasNoCracksWhereLargerElementsMeetSmallerOnes) {
+  const Scene scene = tiny::cube_with_block(1.0, 0.5, 1.0);
+  const Prediction prediction = solved(scene, 300);
+  ASSERT_FALSE(hanging_vertices(prediction.fine().mesh).empty());
+  const SolutionSurface surface = solution_surface(prediction);
+  const auto& at = surface.positions_m;
+  std::size_t inside = 0;
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+    const Vec3& a = at[surface.triangles[t]];
+    const Vec3& b = at[surface.triangles[t % 3 == 2 ? t - 2 : t + 1]];
+    for (std::size_t u = 0; u < surface.triangles.size(); ++u) {
+      if (surface.surface[u / 3] != surface.surface[t / 3]) continue;
+      const Vec3 x = at[surface.triangles[u]] - a, along = (b - a).normalized();
+      const double t_m = along.dot(x);
+      inside += t_m > 1e-6 && t_m < (b - a).norm() - 1e-6 && (x - t_m * along).norm() < 1e-7;
+    }
+  }
+  EXPECT_EQ(inside, 0u);
 }
 
 TEST(SolutionGlb, HoldsTheSurfaceAndKeepsTheSpecification) {
