@@ -146,9 +146,6 @@ json outcome_of(const Job& job, const std::string& file, int code, double proces
   return result;
 }
 
-// Files carry the time that a solve took: of two equal runs all else is equal.
-bool is_number_shown(const std::string& key) { return key != "seconds"; }
-
 LedgerHeader header_of(const CLI::App& command, const std::vector<Job>& jobs,
                        const std::vector<std::string>& common, const JobShare& share) {
   LedgerHeader header;
@@ -228,7 +225,10 @@ std::string state_file(const std::string& folder, const JobShare& share) {
 int run_array(const CLI::App& command, const ArrayArguments& array, const std::string& first_scene,
               const std::string& output, const std::string& extension) {
   if (output.empty()) throw InputError("-o", 0, "a folder for the results of all jobs", "none");
-  if (fs::exists(output) && !fs::is_directory(output))
+  static const std::set<std::string> kFiles = {".json", ".vtu", ".glb", ".html",
+                                               ".exr",  ".tif", ".png"};
+  if ((fs::exists(output) && !fs::is_directory(output)) ||
+      kFiles.contains(fs::path(output).extension().string()))
     throw InputError(output, 0, "a folder for the results of all jobs", "a file");
   const JobShare share = share_of_jobs(array.index, array.parts);
   std::vector<std::string> scenes = {first_scene};
@@ -267,8 +267,7 @@ int present_array(const RunLedger& ledger, const std::string& csv) {
   for (std::size_t job = 0; job < ledger.header().jobs.size(); ++job)
     if (ledger.result(job).contains("numbers"))
       for (const auto& [key, value] : ledger.result(job)["numbers"].items())
-        if (is_number_shown(key) && std::find(columns.begin(), columns.end(), key) == columns.end())
-          columns.push_back(key);
+        if (std::find(columns.begin(), columns.end(), key) == columns.end()) columns.push_back(key);
   std::string text = "job,exit_code,processor_s,file";
   for (const std::string& column : columns) text += "," + column;
   text += "\n";

@@ -21,6 +21,14 @@ std::optional<CameraDescription> camera_of(const Scene& scene, const std::string
   return std::nullopt;
 }
 
+Goal goal_of(const Scene& scene, const std::string& name) {
+  try {
+    return goal_of_name(name, scene);
+  } catch (const std::invalid_argument& error) {
+    throw InputError("the goal of the plan", 0, "a goal that this scene has", error.what());
+  }
+}
+
 }  // namespace
 
 Plan plan_for(const Scene& scene, const PredictionArguments& wished) {
@@ -30,11 +38,8 @@ Plan plan_for(const Scene& scene, const PredictionArguments& wished) {
   request.memory_limit_bytes = wished.memory_MiB << 20;
   request.progress = terminal_progress(wished.quiet);
   request.camera = camera_of(scene, wished.automatic);
-  if (!wished.automatic.empty() && wished.automatic != kDefaultGoal) try {
-      request.goal = goal_of_name(wished.automatic, scene);
-    } catch (const std::invalid_argument& error) {
-      throw InputError("the goal of the plan", 0, "a goal that this scene has", error.what());
-    }
+  if (!wished.automatic.empty() && wished.automatic != kDefaultGoal)
+    request.goal = goal_of(scene, wished.automatic);
   return make_plan(scene, request);
 }
 

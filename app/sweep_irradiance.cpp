@@ -125,10 +125,15 @@ class IrradianceSweep : public SweepSubject {
     return std::max(kSmallestElements, kGridsOfAPiece * pieces);
   }
 
+  // Lines of contact may leave two requests with the same mesh: the coarsest there is.
   std::vector<std::size_t> ladder() const {
     std::vector<std::size_t> elements;
-    for (std::size_t n = smallest_elements(); n <= arguments_.largest_elements; n *= 2)
-      elements.push_back(n);
+    std::size_t last = 0;
+    for (std::size_t n = smallest_elements(); n <= arguments_.largest_elements; n *= 2) {
+      const std::size_t size = uniform_mesh(scene_, edge_for_count(scene_, n / 16), 2).size();
+      if (size != last) elements.push_back(n);
+      last = size;
+    }
     return elements;
   }
 

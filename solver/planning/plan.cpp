@@ -9,7 +9,6 @@
 
 #include "hierarchy/hierarchical_exchange.h"
 #include "transport/prediction.h"
-#include "transport/streamed_exchange.h"
 
 namespace truebox {
 namespace {
@@ -20,6 +19,8 @@ constexpr std::size_t kGridsOfAPiece = 16;    // elements of a piece that three 
 constexpr double kAdaptingPaysFrom = 1500.0;  // elements; measured, solver/README.md
 constexpr double kSolverShare = 1e-3;         // of the target, as predict_to_target takes
 constexpr double kCoarseLinks = 0.1, kFineLinks = 1e-2;
+constexpr double kStreamedMatrices =
+    40.0;  // what passes over rows made anew take; solver/README.md
 constexpr double kStreamingPatience_s = 600.0;  // of processor time; longer, and links are better
 constexpr double kLinksBound = 3.0;             // what a bound holds of the links' own estimate
 
@@ -164,8 +165,7 @@ class Planner {
                                   : std::min(request_.target_error, plan_.pilot->bound_for(wanted));
     const double fits =
         std::floor(std::sqrt(static_cast<double>(request_.memory_limit_bytes) / sizeof(double)));
-    const double streamed_s =
-        streamed_slowdown(uniform.matrix_passes) * uniform.processor_s_for(uniform_elements);
+    const double streamed_s = kStreamedMatrices * uniform.processor_s_for(uniform_elements);
     if (wanted > fits && streamed_s <= kStreamingPatience_s) {
       plan_.exchange = PlannedExchange::streamed;
       plan_.mesh = PlannedMesh::uniform;
@@ -230,14 +230,11 @@ class Planner {
       d.choice = "streamed: rows made anew for each pass, about " +
                  mebibytes(static_cast<double>(plan_.bytes));
       d.why = "a matrix takes " + mebibytes(matrix_bytes) + ", above the limit of " +
-              mebibytes(static_cast<double>(request_.memory_limit_bytes)) + "; " +
-              count(plan_.pilot->matrix_passes) + " passes without it take " +
-              seconds(plan_.processor_s) + ", and the bound stays one";
-      d.left_out = "the matrix, and the scaling of its rows to one";
+              mebibytes(static_cast<double>(request_.memory_limit_bytes)) +
+              "; without it the passes take " + seconds(plan_.processor_s) +
+              ", and the bound stays one";
+      d.left_out = "the matrix";
       d.planned_work = static_cast<double>(plan_.bytes) / (1 << 20);
-      d.error_kind = ErrorKind::estimate;
-      d.error = plan_.pilot->form_factors.closure_error_mean;
-      d.error_of = "row sums, rms, of the pilot";
     } else {
       plan_.exchange = PlannedExchange::hierarchical;
       plan_.mesh = PlannedMesh::uniform;
@@ -320,19 +317,20 @@ class Planner {
   void decide_bands(int reduced, double solver_bound) {
     const std::size_t all = scene_.bands.size(), distinct = plan_.needs.distinct_bands.size();
     plan_.bands_solved = distinct - static_cast<std::size_t>(reduced);
-    Decision d{"bands", count(plan_.bands_solved) + " of " + count(all) + " solved", ""};
+    Decision d{"bands", count(plan_.bands_solved) + " of " + count(all) + " solved by themselves",
+               ""};
     d.why = distinct == all ? "no two are multiples of each other"
                             : count(all - distinct) + " are exact multiples of others";
     if (distinct < all) d.left_out = "bands that are multiples of others";
     if (reduced > 0) {
       d.why += "; surfaces share few materials, so " + count(static_cast<std::size_t>(reduced)) +
-               " are found on the basis of the others, each held to its own residual";
-      d.left_out += std::string(d.left_out.empty() ? "" : ", and ") + "bands on the others' basis";
+               " are found on a basis that bands share, each held to its own residual";
+      d.left_out += std::string(d.left_out.empty() ? "" : ", and ") + "passes of their own";
       d.error_kind = ErrorKind::bound;
       d.error = solver_bound;
     }
     d.error_of = "radiosity";
-    d.work = "bands";
+    d.work = "bands by themselves";
     d.planned_work = static_cast<double>(plan_.bands_solved);
     d.full_work = static_cast<double>(all);
     add(std::move(d));

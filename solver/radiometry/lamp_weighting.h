@@ -11,9 +11,10 @@ namespace truebox {
 /// Few bands that still give the colour of many reflections: what is measured in a band counts as
 /// the light of the lamp has it there,
 ///   f_b = integral_b f S dlambda / integral_b S dlambda,
-/// for reflectances and for colour matching functions alike. One reflection of that lamp's light is
-/// then exact in X, Y, Z whatever the number of bands, and two are wrong by the covariance of two
-/// reflectances within a band alone.
+/// for reflectances and for colour matching functions alike. The flux that one reflection of that
+/// lamp's light leaves is then exact whatever the number of bands; a colour, or what several
+/// reflections leave, is wrong by how reflectances and matching functions vary together within a
+/// band: by the square of its width.
 
 /// `count` bands of one width that fill [from, to]; std::invalid_argument where there are none.
 WavelengthGrid equal_bands(double from_nm, double to_nm, std::size_t count);
