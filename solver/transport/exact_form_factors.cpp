@@ -101,7 +101,7 @@ class ExactPairs {
         tolerance_m_(1e-9 * scene.diameter_m()),
         planner(mesh, scene, polygons, tolerance_m_, options.occlusion),
         kernel(polygons, planner.order(), options.relative_tolerance, 2.0 * tolerance_m_),
-        adaptive_{options.relative_tolerance, 200'000},
+        adaptive_{.relative_tolerance = options.relative_tolerance},
         outline_points_(options.outline_points),
         outline_tolerance_(options.outline_tolerance) {}
 
