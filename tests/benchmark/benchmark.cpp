@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -85,6 +86,63 @@ void print(const ClosedBox& c) {
   fmt::print("{:>9}{:>9}{:>10}{:>10.3f}{:>10.3f}{:>12.3f}{:>12.3f}{:>12.3f}{:>11.1f}\n", c.elements,
              c.threads, name_of(c.method), c.job_s, c.job_cpu_s, 100.0 * c.rms_error,
              100.0 * c.rms_standard_error, 100.0 * c.mean_bound, 100.0 * c.covered);
+}
+
+nlohmann::json as_json(const FormFactorRows& f) {
+  return {{"elements", f.elements},
+          {"threads", f.threads},
+          {"points", f.points},
+          {"tolerance", f.tolerance},
+          {"cpu_s", f.cpu_s},
+          {"wall_s", f.wall_s},
+          {"pairs_per_s", f.pairs / f.cpu_s},
+          {"row_sum_rms_error", f.row_sum_rms_error},
+          {"row_sum_max_error", f.row_sum_max_error},
+          {"buried_rows", f.buried_rows},
+          {"row_difference", f.row_difference},
+          {"memory_bytes", f.memory_bytes}};
+}
+
+// View3D on the same scene and kind of machine, one thread: time and rms error of row sums; and
+// the setting that takes less of both here.
+struct View3D {
+  std::size_t elements;
+  double time_s, rms_error;
+  int points = 3;
+  double tolerance = 1e-4;
+};
+constexpr View3D kView3D[] = {{497, 1.3, 1.7e-4},
+                              {988, 4.1, 1.1e-4},
+                              {2018, 16.8, 5.7e-5, 4},
+                              {5005, 117.0, 6.6e-5, 3, 3e-4}};
+
+// All pairs of the closed box next to the field's program. Its time is scaled by the pairs.
+void compare_form_factors(const std::string& reference, nlohmann::json& json) {
+  fmt::print(
+      "\nForm factors of the closed box without rays, rows before any repair\n"
+      "{:>9}{:>8}{:>8}{:>11}{:>9}{:>9}{:>9}{:>10}{:>10}{:>8}{:>12}{:>9}{:>10}{:>8}\n",
+      "elements", "threads", "points", "tolerance", "CPU / s", "wall / s", "Mpairs/s", "rms", "max",
+      "buried", "off by hand", "B / pair", "View3D rms", "x time");
+  const auto line = [&](const View3D& other, int threads, int points, double tolerance, int rows) {
+    const FormFactorRows f =
+        measure_form_factor_rows(reference, other.elements, threads, points, tolerance, rows);
+    const double scaled = std::pow(static_cast<double>(f.elements) / other.elements, 2);
+    const double n = static_cast<double>(f.elements);
+    fmt::print(
+        "{:>9}{:>8}{:>8}{:>11.0e}{:>9.3f}{:>9.3f}{:>9.2f}{:>10.1e}{:>10.1e}{:>8}{:>12.1e}{:>9.2f}"
+        "{:>10.1e}{:>8.0f}\n",
+        f.elements, threads, points, tolerance, f.cpu_s, f.wall_s, 1e-6 * f.pairs / f.cpu_s,
+        f.row_sum_rms_error, f.row_sum_max_error, f.buried_rows, f.row_difference,
+        static_cast<double>(f.memory_bytes) / (n * n), other.rms_error,
+        other.time_s * scaled / f.cpu_s);
+    std::fflush(stdout);
+    json["form_factor_rows"].push_back(as_json(f));
+  };
+  for (int threads : {1, 2})
+    for (const View3D& other : kView3D)
+      line(other, threads, other.points, other.tolerance, threads == 1 ? 8 : 0);
+  line({497, 63.0, 2.3e-6}, 1, 0, 1e-6, 0);
+  line({497, 63.0, 2.3e-6}, 1, 0, 1e-9, 8);
 }
 
 void print(const Kernels& k) {
@@ -169,7 +227,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   program.add_option("--json", json_path, "also write every number as JSON");
   program.add_option("--reference", reference, "the folder of reference data");
-  bool only_pictures = false;
+  bool only_pictures = false, only_form_factors = false;
+  program.add_flag("--only-form-factors", only_form_factors, "all pairs next to View3D, no more");
   std::vector<int> samples{16, 64, 256, 1024};
   program.add_flag("--only-pictures", only_pictures, "radiosity against path tracing, no more");
   program.add_option("--samples", samples, "paths a pixel")->delimiter(',');
@@ -189,6 +248,16 @@ int main(int argc, char** argv) {
   nlohmann::json json{{"threads", std::thread::hardware_concurrency()},
                       {"compiler", __VERSION__},
                       {"scene", "cornell_box"}};
+  const auto kernels_of_all = [&] {
+    const Kernels kernels = measure_kernels(scene, kernel_elements);
+    print(kernels);
+    json["kernels"] = as_json(kernels);
+  };
+  if (only_form_factors) {
+    compare_form_factors(reference, json);
+    kernels_of_all();
+    return 0;
+  }
   fmt::print(
       "Irradiance against independent path tracing, relative, in %\n"
       "{:>9}{:>10}{:>9}{:>12}{:>12}{:>12}{:>12}{:>11}\n",
@@ -228,9 +297,8 @@ int main(int argc, char** argv) {
       json["closed_box_hierarchical"].push_back(as_json(box));
     }
   if (only_closed_box) return 0;
-  const Kernels kernels = measure_kernels(scene, kernel_elements);
-  print(kernels);
-  json["kernels"] = as_json(kernels);
+  compare_form_factors(reference, json);
+  kernels_of_all();
   const auto solvers = measure_solvers(scene, kernel_elements, {1e-2, 1e-4, 1e-7, 1e-12});
   print(solvers);
   for (const SolverWork& work : solvers) json["solvers"].push_back(as_json(work));

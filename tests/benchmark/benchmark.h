@@ -62,6 +62,26 @@ struct ClosedBox {
 ClosedBox measure_closed_box(const std::filesystem::path& reference_dir, std::size_t elements,
                              int threads, FormFactorMethod method, double link_tolerance = 0.0);
 
+/// Form factors of all pairs of the closed box, without rays, before any repair: rows must sum
+/// to 1.
+struct FormFactorRows {
+  std::size_t elements = 0;
+  int threads = 1;
+  int points = 0;          ///< of partly hidden pairs, along one direction; 0: adaptive
+  double tolerance = 0.0;  ///< for more points, or of adaptive visibility
+  double cpu_s = 0.0, wall_s = 0.0;
+  double pairs = 0.0;
+  double row_sum_rms_error = 0.0;  ///< area-weighted
+  double row_sum_max_error = 0.0;
+  std::size_t buried_rows = 0;  ///< patches under a block, which see nothing; all others count
+  /// Largest sum over a row of |F_ij - brute force|, some rows; brute force is good to some 1e-3.
+  double row_difference = 0.0;
+  std::size_t memory_bytes = 0;  ///< by which the largest resident set grew
+};
+FormFactorRows measure_form_factor_rows(const std::filesystem::path& reference_dir,
+                                        std::size_t elements, int threads, int points,
+                                        double tolerance, int rows_compared);
+
 /// What the machine does, and what the program makes of it.
 struct Kernels {
   std::size_t elements = 0, bands = 0;
