@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
+#include <string>
 
 #include "discontinuity/line_selection.h"
 #include "mesh/uniform_cells.h"
@@ -150,9 +152,30 @@ std::size_t count_of(const std::vector<std::vector<Polygon>>& cells) {
 
 }  // namespace
 
+namespace {
+
+// Every pair of a piece and a luminaire looks at every blocker: minutes, beyond that.
+constexpr std::size_t kMostLooks = 1000000000;
+
+void require_few_pairs(const PatchMesh& pieces, const Scene& scene) {
+  std::size_t lamps = 0;
+  for (const Piece& piece : pieces.pieces)
+    lamps += scene.material_of(scene.surfaces[piece.surface]).emits();
+  const std::size_t count = pieces.pieces.size();
+  if (static_cast<double>(count) * static_cast<double>(count) * static_cast<double>(lamps) >
+      static_cast<double>(kMostLooks))
+    throw std::length_error("lines of " + std::to_string(lamps) + " luminaires on " +
+                            std::to_string(count) +
+                            " pieces of surface are too many to look for: leave out "
+                            "--discontinuities");
+}
+
+}  // namespace
+
 std::vector<std::vector<DiscontinuityLine>> lines_of_light(const Scene& scene,
                                                            const DiscontinuityOptions& options) {
   const PatchMesh pieces = uniform_mesh(scene, scene.diameter_m());
+  require_few_pairs(pieces, scene);
   const Gather gather(pieces, scene, true);
   const ShaftCulling culling(pieces, scene, true);
   const LineOptions line_options{edge_for_count(scene, options.cells),
