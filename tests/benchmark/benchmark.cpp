@@ -199,6 +199,30 @@ nlohmann::json as_json(const PictureBenchmark& pictures) {
   return json;
 }
 
+std::vector<LinkGrowth> print_links(const truebox::Scene& closed_box) {
+  fmt::print(
+      "\nLinks and the full matrix (outlines), one thread\n{:>26}{:>10}{:>10}{:>10}{:>10}{:>10}"
+      "{:>10}{:>10}{:>10}{:>10}\n",
+      "scene", "tolerance", "elements", "links", "MiB", "CPU / s", "MiB", "CPU / s", "estimate",
+      "error");
+  std::vector<LinkGrowth> rows;
+  const auto add = [&rows](const LinkGrowth& r) {
+    fmt::print("{:>26}{:>10.2g}{:>10}{:>10}{:>10}{:>10.2f}{:>10}{:>10.2f}{:>10.1e}{:>10.1e}\n",
+               r.scene.substr(0, 25), r.tolerance, r.elements, r.links, r.links_bytes >> 20,
+               r.links_s, r.matrix_bytes >> 20, r.matrix_s, r.estimate, r.error);
+    std::fflush(stdout);
+    rows.push_back(r);
+  };
+  constexpr std::size_t kLargestMatrix = 6000;
+  for (double tolerance : {1e-2, 3e-3})
+    for (std::size_t count : {600u, 1200u, 2400u, 5000u, 10000u, 20000u})
+      add(measure_links("closed box", closed_box, count, tolerance, count < kLargestMatrix));
+  for (std::size_t count : {3400u, 10000u, 25000u, 50000u})
+    add(measure_links("museum of more rooms", museum_of(count), count, 0.1, false));
+  for (std::size_t count : {128u, 512u, 2048u}) add(measure_facing_squares(count));
+  return rows;
+}
+
 void print(const std::vector<SolverWork>& solvers) {
   fmt::print("\nPasses over the matrix to a relative bound\n{:>12}{:>16}{:>16}{:>22}\n", "bound",
              "krylov", "gauss-seidel", "time, krylov = 1");
@@ -232,6 +256,10 @@ int main(int argc, char** argv) {
   std::vector<int> samples{16, 64, 256, 1024};
   program.add_flag("--only-pictures", only_pictures, "radiosity against path tracing, no more");
   program.add_option("--samples", samples, "paths a pixel")->delimiter(',');
+  bool only_links = false;
+  std::string links_picture;
+  program.add_flag("--only-links", only_links, "links against elements, no more");
+  program.add_option("--links-svg", links_picture, "draw them into this file");
   CLI11_PARSE(program, argc, argv);
 
   const auto scene =
@@ -241,6 +269,12 @@ int main(int argc, char** argv) {
         truebox::in_bands_at(scene, {400.0, 452.0, 500.0, 552.0, 600.0, 652.0, 700.0}), elements,
         samples);
   };
+  if (only_links) {
+    const auto rows = print_links(truebox::read_scene(std::filesystem::path(reference) /
+                                                      "independent_renders" / "closed_box.toml"));
+    if (!links_picture.empty()) std::ofstream(links_picture) << links_svg(rows) << '\n';
+    return 0;
+  }
   if (only_pictures) {
     print(pictures());
     return 0;

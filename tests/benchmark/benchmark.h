@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <ctime>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -26,6 +27,15 @@ double best_seconds(const Work& work, int repetitions = 5) {
   double best = std::numeric_limits<double>::infinity();
   for (int i = 0; i < repetitions; ++i) best = std::min(best, seconds(work));
   return best;
+}
+
+/// Processor time of one call, all threads, s: what a busy machine does not change.
+template <class Work>
+double processor_seconds(const Work& work) {
+  const auto now = [] { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; };
+  const double start = now();
+  work();
+  return now() - start;
 }
 
 /// A prediction of the Cornell Box against independent path tracing, relative to the irradiance,
@@ -121,5 +131,24 @@ struct PictureBenchmark {
 };
 PictureBenchmark measure_pictures(const Scene& scene, const std::vector<std::size_t>& elements,
                                   const std::vector<int>& samples);
+
+/// Links of one mesh and tolerance, and the full matrix of the same mesh: finding and solving in
+/// the scene's bands, one thread.
+struct LinkGrowth {
+  std::string scene;
+  double tolerance = 0.0;
+  std::size_t elements = 0, links = 0;
+  std::size_t links_bytes = 0, matrix_bytes = 0;
+  double links_s = 0.0, matrix_s = 0.0;  ///< processor time; matrix 0: not asked for
+  double estimate = 0.0;  ///< of what links leave out, rms relative to the mean irradiance
+  double error = 0.0;     ///< the same against the matrix
+};
+LinkGrowth measure_links(const std::string& name, const Scene& scene, std::size_t elements,
+                         double tolerance, bool with_matrix);
+/// The caveat (Garmann 1995): two fixed patches and a tolerance of 0 link every pair.
+LinkGrowth measure_facing_squares(std::size_t elements);
+Scene museum_of(std::size_t patches);
+/// Links against elements, a curve a scene and tolerance in the order of the rows.
+std::string links_svg(const std::vector<LinkGrowth>& rows);
 
 }  // namespace truebox::benchmark
