@@ -54,23 +54,38 @@ struct Sum {
   std::vector<double> areas;
 };
 
-/// A visible part as triangles about its first vertex; each stands for itself at its middle.
-void add_part(const Camera& camera, const Polygon& part, Sum& sum) {
-  for (std::size_t k = 2; k < part.size(); ++k) {
-    const Vec3 a = on_film(camera, part[0]), b = on_film(camera, part[k - 1]),
-               c = on_film(camera, part[k]);
-    const double area = 0.5 * (b - a).cross(c - a).norm();
-    if (!(area > 0.0)) continue;
-    // The middle on the film: corners count by one over their depth.
-    const double za = 1.0 / camera.camera_from_world(part[0]).z(),
-                 zb = 1.0 / camera.camera_from_world(part[k - 1]).z(),
-                 zc = 1.0 / camera.camera_from_world(part[k]).z();
-    const Vec3 point = (za * part[0] + zb * part[k - 1] + zc * part[k]) / (za + zb + zc);
-    sum.area += area;
-    sum.first_moment += area * point;
-    sum.points.push_back(point);
-    sum.areas.push_back(area);
+/// The film's middle of a triangle stands for it: corners count by one over their depth.
+void add_triangle(const Camera& camera, const std::array<Vec3, 3>& corner, int halvings, Sum& sum) {
+  std::array<double, 3> nearness{};
+  for (std::size_t k = 0; k < 3; ++k) nearness[k] = 1.0 / camera.camera_from_world(corner[k]).z();
+  const auto middle = [&](std::size_t i, std::size_t j) -> Vec3 {
+    return (nearness[i] * corner[i] + nearness[j] * corner[j]) / (nearness[i] + nearness[j]);
+  };
+  if (halvings > 0) {  // through the middles of the sides as the film sees them
+    const std::array<Vec3, 3> m = {middle(0, 1), middle(1, 2), middle(2, 0)};
+    add_triangle(camera, m, halvings - 1, sum);
+    add_triangle(camera, {corner[0], m[0], m[2]}, halvings - 1, sum);
+    add_triangle(camera, {m[0], corner[1], m[1]}, halvings - 1, sum);
+    add_triangle(camera, {m[2], m[1], corner[2]}, halvings - 1, sum);
+    return;
   }
+  const Vec3 a = on_film(camera, corner[0]);
+  const double area =
+      0.5 * (on_film(camera, corner[1]) - a).cross(on_film(camera, corner[2]) - a).norm();
+  if (!(area > 0.0)) return;
+  const Vec3 point = (nearness[0] * corner[0] + nearness[1] * corner[1] + nearness[2] * corner[2]) /
+                     (nearness[0] + nearness[1] + nearness[2]);
+  sum.area += area;
+  sum.first_moment += area * point;
+  sum.points.push_back(point);
+  sum.areas.push_back(area);
+}
+
+/// A visible part as triangles about its first vertex, each cut in four.
+void add_part(const Camera& camera, const Polygon& part, Sum& sum) {
+  constexpr int kHalvings = 1;
+  for (std::size_t k = 2; k < part.size(); ++k)
+    add_triangle(camera, {part[0], part[k - 1], part[k]}, kHalvings, sum);
 }
 
 struct Candidate {

@@ -77,6 +77,13 @@ void fit_rounds(SceneFitProblem& problem, ShapedScene& shaped, const ShapeFitOpt
       p.start = start->second;
       if (std::abs(p.estimate.value - p.start) > 1e-9 * std::max(std::abs(p.start), 1e-3))
         p.at_initial_value = false;
+      // Said of where the last round began.
+      constexpr const char* kStays = "at its initial value";
+      const std::size_t said = p.note.find(kStays);
+      if (p.at_initial_value || said == std::string::npos) continue;
+      p.note.erase(said, std::string(kStays).size());
+      if (p.note.substr(said).starts_with("; ")) p.note.erase(said, 2);
+      if (p.note.ends_with("; ")) p.note.erase(p.note.size() - 2);
     }
 }
 

@@ -112,81 +112,55 @@ double skewness_rad(const PlanePolygon& quad) {
 constexpr double kMostSkewed_rad = 0.9;  // 52 degrees: beyond, two triangles serve as well
 constexpr double kStraight_rad = 1e-5;   // where lines end on an edge, moved by rounding
 
-// A corner that a polygon has inside its edge.
-struct InsideEdge {
-  Vec2 corner, from, to;
-};
-
-struct Simplified {
-  PlanePolygon outline;
-  std::vector<InsideEdge> left_out;
-};
-
-Simplified without_straight_corners(const PlanePolygon& p) {
-  Simplified s;
-  std::vector<std::size_t> kept;
+PlanePolygon without_straight_corners(const PlanePolygon& p) {
+  PlanePolygon kept;
   for (std::size_t k = 0; k < p.size(); ++k)
-    if (std::abs(std::abs(angle_at(p, k)) - std::numbers::pi) > kStraight_rad) kept.push_back(k);
-  for (std::size_t e = 0; e < kept.size(); ++e) {
-    const std::size_t next = kept[(e + 1) % kept.size()];
-    s.outline.push_back(p[kept[e]]);
-    for (std::size_t k = (kept[e] + 1) % p.size(); k != next; k = (k + 1) % p.size())
-      s.left_out.push_back({p[k], p[kept[e]], p[next]});
-  }
-  return s;
+    if (std::abs(std::abs(angle_at(p, k)) - std::numbers::pi) > kStraight_rad) kept.push_back(p[k]);
+  return kept;
 }
 
-// Where corners are once they have been moved exactly onto the edges they stand on.
-class Places {
+// Puts corners, which noding has moved by up to a snap, back exactly onto the lines they stand on:
+// elements beside a line of contact must touch what stands there, not leave a gap of 1e-8.
+class Rails {
  public:
-  Places(const PlanePolygon& outline, double snap_m) : outline_(outline), snap_m_(snap_m) {}
-
-  void add(const std::vector<InsideEdge>& corners) {
-    inside_edges_.insert(inside_edges_.end(), corners.begin(), corners.end());
+  Rails(const PlanePolygon& outline, const std::vector<PlaneSegment>& segments, double snap_m)
+      : reach_m_(2.0 * snap_m) {
+    for (std::size_t k = 0; k < outline.size(); ++k)
+      rails_.push_back({outline[k], outline[(k + 1) % outline.size()]});
+    rails_.insert(rails_.end(), segments.begin(), segments.end());
   }
 
-  void apply(std::vector<PlanePolygon>& cells) {
-    for (const PlanePolygon& cell : cells)
-      for (const Vec2& corner : cell) place_[key(corner)] = on_outline(corner);
-    // One edge's corner may stand on another's edge: round by round they settle.
-    double moved_m = snap_m_;
-    for (int round = 0; round < kMostRounds && moved_m > kSettled * snap_m_; ++round) {
-      moved_m = 0.0;
-      for (const auto& [corner, from, to] : inside_edges_) {
-        const auto found = place_.find(key(corner));
-        if (found == place_.end() || is_on_outline(corner)) continue;
-        const Vec2 a = place_.at(key(from)), along = place_.at(key(to)) - a;
-        const Vec2 foot = a + along.dot(found->second - a) / along.squaredNorm() * along;
-        moved_m = std::max(moved_m, (foot - found->second).norm());
-        found->second = foot;
+  Vec2 placed(const Vec2& x) const {
+    for (const PlaneSegment& rail : rails_)
+      for (const Vec2& end : {rail.from, rail.to})
+        if ((end - x).norm() < reach_m_) return end;
+    const PlaneSegment* first = nullptr;
+    for (const PlaneSegment& rail : rails_) {
+      if (!passes(rail, x)) continue;
+      if (!first) {
+        first = &rail;
+        continue;
       }
+      const double sine = cross(first->direction(), rail.direction());
+      if (std::abs(sine) < kParallel) continue;
+      return first->from +
+             cross(rail.from - first->from, rail.direction()) / sine * first->direction();
     }
-    for (PlanePolygon& cell : cells)
-      for (Vec2& corner : cell) corner = place_.at(key(corner));
+    if (!first) return x;
+    return first->from + first->direction().dot(x - first->from) * first->direction();
   }
 
  private:
-  static constexpr int kMostRounds = 2000;
-  static constexpr double kSettled = 1e-9;  // 2^-24 of a piece times that is rounding
-  static std::pair<double, double> key(const Vec2& x) { return {x.x(), x.y()}; }
+  static constexpr double kParallel = 1e-3;  // sine: what crosses at less is one line here
 
-  bool is_on_outline(const Vec2& x) const { return on_outline(x) != x; }
-
-  Vec2 on_outline(const Vec2& x) const {
-    for (const Vec2& corner : outline_)
-      if ((corner - x).norm() < 2.0 * snap_m_) return corner;
-    for (std::size_t k = 0; k < outline_.size(); ++k) {
-      const Vec2 along = outline_[(k + 1) % outline_.size()] - outline_[k];
-      const Vec2 foot = outline_[k] + along.dot(x - outline_[k]) / along.squaredNorm() * along;
-      if ((foot - x).norm() < 2.0 * snap_m_) return foot;
-    }
-    return x;
+  bool passes(const PlaneSegment& rail, const Vec2& x) const {
+    const double at_m = rail.direction().dot(x - rail.from);
+    return at_m > -reach_m_ && at_m < rail.length_m() + reach_m_ &&
+           std::abs(cross(rail.direction(), x - rail.from)) < reach_m_;
   }
 
-  const PlanePolygon& outline_;
-  double snap_m_;
-  std::vector<InsideEdge> inside_edges_;
-  std::map<std::pair<double, double>, Vec2> place_;
+  std::vector<PlaneSegment> rails_;  // the outline first: it counts for more
+  double reach_m_;
 };
 
 // Triangles of one face, paired to quads across the edges they share, the squarest first.
@@ -227,14 +201,12 @@ void add_paired(const std::vector<PlanePolygon>& triangles, std::vector<PlanePol
     if (!taken[t]) cells.push_back(triangles[t]);
 }
 
-void add_cells_of_face(const Geos& geos, const GEOSGeometry* face, Places& places,
+void add_cells_of_face(const Geos& geos, const GEOSGeometry* face,
                        std::vector<PlanePolygon>& cells) {
   if (!geos.has_holes(face)) {
-    Simplified simple = without_straight_corners(geos.outline_of(face));
-    const PlanePolygon& outline = simple.outline;
+    PlanePolygon outline = without_straight_corners(geos.outline_of(face));
     if (outline.size() == 3 || (outline.size() == 4 && skewness_rad(outline) < kMostSkewed_rad)) {
-      places.add(simple.left_out);
-      cells.push_back(std::move(simple.outline));
+      cells.push_back(std::move(outline));
       return;
     }
   }
@@ -257,10 +229,11 @@ std::vector<PlanePolygon> cells_between_lines(const PlanePolygon& outline,
   const Geos::Geometry noded = geos.noded(lines.get(), snap_m);
   const Geos::Geometry faces = geos.faces(noded.get());
   std::vector<PlanePolygon> cells;
-  Places places(outline, snap_m);
   for (int k = 0; k < geos.parts(faces.get()); ++k)
-    add_cells_of_face(geos, geos.part(faces.get(), k), places, cells);
-  places.apply(cells);
+    add_cells_of_face(geos, geos.part(faces.get(), k), cells);
+  const Rails rails(outline, segments, snap_m);
+  for (PlanePolygon& cell : cells)
+    for (Vec2& corner : cell) corner = rails.placed(corner);
   return cells;
 }
 

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
+#include <string>
 
 #include "discontinuity/line_selection.h"
 #include "mesh/uniform_cells.h"
@@ -16,6 +18,7 @@ namespace {
 constexpr double kSnap = 0x1p-24;      // of a piece's diameter: corners closer than that are one
 constexpr double kLongest = 1.5;       // edge of a triangle, in edges of a square element
 constexpr double kShareOfLines = 0.5;  // of the cells, those that following the lines alone takes
+constexpr double kThinnest = 0.03;     // width of a face, in distances that lines keep apart
 constexpr int kBisections = 8;
 
 double total_exitance(const Material& material) {
@@ -66,6 +69,20 @@ Vec3 on_outline(const Vec3& x, const Polygon& outline, double tolerance_m) {
     if ((foot - x).norm() < tolerance_m) return foot;
   }
   return x;
+}
+
+// Of the thinnest cell: area over longest extent.
+double least_width_m(const std::vector<PlanePolygon>& cells) {
+  double least_m = std::numeric_limits<double>::infinity();
+  for (const PlanePolygon& cell : cells) {
+    double twice_m2 = 0.0, extent_m = 0.0;
+    for (std::size_t k = 1; k < cell.size(); ++k) {
+      twice_m2 += cross(cell[k - 1] - cell[0], cell[k] - cell[0]);
+      for (std::size_t j = 0; j < k; ++j) extent_m = std::max(extent_m, (cell[k] - cell[j]).norm());
+    }
+    least_m = std::min(least_m, 0.5 * twice_m2 / extent_m);
+  }
+  return least_m;
 }
 
 // The lines of a grid, of the lowest rank: elements are squares away from lines that are followed.
@@ -124,14 +141,33 @@ class Cells {
         ranked.push_back(
             {{frame.flat(line.from), frame.flat(line.to)}, line.strength, line.order == 0});
     if (ranked.empty()) return {};
+    std::stable_sort(ranked.begin(), ranked.end(), [](const RankedLine& a, const RankedLine& b) {
+      return a.must_be != b.must_be ? a.must_be : a.rank > b.rank;
+    });
+    const auto musts = static_cast<std::size_t>(
+        std::count_if(ranked.begin(), ranked.end(), [](const auto& line) { return line.must_be; }));
+    const std::size_t without_guides = ranked.size();
     add_guides(outline, edge_m, ranked);
-    const auto segments = selected_lines(outline, std::move(ranked), apart_m_);
     const double snap_m = kSnap * diameter_m(polygon);
+    // Three lines that almost meet leave a splinter, whose form factors cost more than all others:
+    // then without guides, then with ever fewer lines.
+    for (std::size_t count = ranked.size();;) {
+      ranked.resize(count);
+      const auto flat =
+          cells_between_lines(outline, selected_lines(outline, ranked, apart_m_), snap_m);
+      if (count == musts || least_width_m(flat) > kThinnest * apart_m_)
+        return in_space(flat, frame, polygon, 2.0 * snap_m);
+      count = count > without_guides ? without_guides : std::max(musts, count * 3 / 4);
+    }
+  }
+
+  static std::vector<Polygon> in_space(const std::vector<PlanePolygon>& cells,
+                                       const PlaneFrame& frame, const Polygon& outline,
+                                       double reach_m) {
     std::vector<Polygon> faces;
-    for (const PlanePolygon& flat : cells_between_lines(outline, segments, snap_m)) {
+    for (const PlanePolygon& flat : cells) {
       Polygon& face = faces.emplace_back();
-      for (const Vec2& x : flat)
-        face.push_back(on_outline(frame.in_space(x), polygon, 2.0 * snap_m));
+      for (const Vec2& x : flat) face.push_back(on_outline(frame.in_space(x), outline, reach_m));
     }
     return faces;
   }
@@ -150,9 +186,30 @@ std::size_t count_of(const std::vector<std::vector<Polygon>>& cells) {
 
 }  // namespace
 
+namespace {
+
+// Every pair of a piece and a luminaire looks at every blocker: minutes, beyond that.
+constexpr std::size_t kMostLooks = 1000000000;
+
+void require_few_pairs(const PatchMesh& pieces, const Scene& scene) {
+  std::size_t lamps = 0;
+  for (const Piece& piece : pieces.pieces)
+    lamps += scene.material_of(scene.surfaces[piece.surface]).emits();
+  const std::size_t count = pieces.pieces.size();
+  if (static_cast<double>(count) * static_cast<double>(count) * static_cast<double>(lamps) >
+      static_cast<double>(kMostLooks))
+    throw std::length_error("lines of " + std::to_string(lamps) + " luminaires on " +
+                            std::to_string(count) +
+                            " pieces of surface are too many to look for: leave out "
+                            "--discontinuities");
+}
+
+}  // namespace
+
 std::vector<std::vector<DiscontinuityLine>> lines_of_light(const Scene& scene,
                                                            const DiscontinuityOptions& options) {
   const PatchMesh pieces = uniform_mesh(scene, scene.diameter_m());
+  require_few_pairs(pieces, scene);
   const Gather gather(pieces, scene, true);
   const ShaftCulling culling(pieces, scene, true);
   const LineOptions line_options{edge_for_count(scene, options.cells),

@@ -22,11 +22,12 @@ constexpr double kFirstShare = 0.1;  // of the tolerance: the first links are to
 constexpr double kFirstOrder = 0.6;  // what links leave out, by powers of what each may
 constexpr double kAim = 0.8;         // of the tolerance
 constexpr double kLargestStep = 1.0 / 256, kSmallestStep = 0.5;  // of a link's error, each round
-constexpr double kLinksOfAnElement = 40.0;                       // at a tolerance of 1e-2, in rooms
-constexpr std::size_t kBytesOfAnElement = 5200;                  // tree, points of groups, kernels
+constexpr double kLinksOfAnElement = 140.0;                      // at a tolerance of 1e-2, in rooms
+constexpr double kOrderOfLinks = 1.5;            // they grow like that power of 1 : tolerance
+constexpr std::size_t kBytesOfAnElement = 5200;  // tree, points and moments, kernels, a product
 constexpr std::size_t kBytesOfPoints = 2 * sizeof(GroupSamples) + 29 * 4 * sizeof(double);
-constexpr std::size_t kBytesOfALink = 40;
-constexpr std::size_t kCopies = 4;  // of links, at most: lists joined, those of elements kept
+constexpr std::size_t kBytesOfALink = 65;  // of all degrees together
+constexpr std::size_t kCopies = 2;  // of links, at most: lists joined, those of elements kept
 constexpr double kMostKernelTolerance = 1e-2, kKernelShare = 0.03;  // of the links' tolerance
 constexpr double kStalled = 0.8;  // of the last estimate: what is left is between single elements
 constexpr double kCloseEnough = 0.02;  // of the tolerance, while rounds follow
@@ -235,9 +236,9 @@ std::string HierarchyOptions::invalid() const {
 std::size_t estimated_bytes(std::size_t elements, const HierarchyOptions& options) {
   const double links =
       std::min(0.5 * static_cast<double>(elements),
-               kLinksOfAnElement * std::pow(1e-2 / options.relative_tolerance, 1.5));
+               kLinksOfAnElement * std::pow(1e-2 / options.relative_tolerance, kOrderOfLinks));
   return static_cast<std::size_t>(static_cast<double>(elements) *
-                                  (kBytesOfAnElement + links * kBytesOfALink));
+                                  (kBytesOfAnElement + links * kBytesOfALink * kCopies));
 }
 
 void require_memory(std::size_t elements, const HierarchyOptions& options) {

@@ -4,6 +4,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <atomic>
 #include <mutex>
 
@@ -74,17 +75,18 @@ class Walk {
   Gather::Scratch scratch_;
 };
 
-constexpr std::uint32_t kElementsOfATask = 64;
+// Each task starts from all blockers again: as few as keep the threads busy.
+constexpr std::size_t kTasks = 64, kLeastElementsOfATask = 64;
 
-void collect_tasks(const ElementTree& tree, std::uint32_t index,
+void collect_tasks(const ElementTree& tree, std::uint32_t index, std::size_t elements_of_a_task,
                    std::vector<std::uint32_t>& tasks) {
   const ElementNode& node = tree.nodes[index];
-  if (node.is_leaf() || node.end - node.begin <= kElementsOfATask) {
+  if (node.is_leaf() || node.end - node.begin <= elements_of_a_task) {
     tasks.push_back(index);
     return;
   }
-  collect_tasks(tree, node.left, tasks);
-  collect_tasks(tree, node.right, tasks);
+  collect_tasks(tree, node.left, elements_of_a_task, tasks);
+  collect_tasks(tree, node.right, elements_of_a_task, tasks);
 }
 
 }  // namespace
@@ -96,7 +98,7 @@ BandMatrix mean_direct(const PatchMesh& mesh, const Scene& scene, const Gather& 
                                        static_cast<Eigen::Index>(scene.bands.size()));
   const std::vector<Lamp> lamps = lamps_of(mesh, scene);
   std::vector<std::uint32_t> tasks;
-  collect_tasks(tree, 0, tasks);
+  collect_tasks(tree, 0, std::max(kLeastElementsOfATask, tree.order.size() / kTasks), tasks);
   std::atomic<std::size_t> done{0};
   std::mutex progress_lock;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tasks.size()), [&](const auto& range) {

@@ -101,7 +101,7 @@ class ExactPairs {
         tolerance_m_(1e-9 * scene.diameter_m()),
         planner(mesh, scene, polygons, tolerance_m_, options.occlusion),
         kernel(polygons, planner.order(), options.relative_tolerance, 2.0 * tolerance_m_),
-        adaptive_{options.relative_tolerance, 200'000},
+        adaptive_{.relative_tolerance = options.relative_tolerance},
         outline_points_(options.outline_points),
         outline_tolerance_(options.outline_tolerance) {}
 
@@ -167,7 +167,7 @@ class ExactPairs {
   }
 
   static constexpr double kAbsolute = 0.1;         // of a row that the tolerance is worth to a pair
-  static constexpr double kFarForCentroids = 4.0;  // radii: then 1/16 of a hidden share is missed
+  static constexpr double kFarForCentroids = 2.0;  // radii; nearer, Lambert of every part
 
   // Shares of the way from a to b where it enters a solid and leaves it, or would.
   static std::pair<double, double> passage(const Vec3& a, const Vec3& b,

@@ -12,10 +12,10 @@ namespace truebox {
 
 struct ExactVisibilityOptions {
   double relative_tolerance = 1e-9;          ///< of the visible exchange area
-  double absolute_tolerance_m2 = 0.0;        ///< suffices, too
   std::size_t most_evaluations = 2'000'000;  ///< points of the receiver; then the bound says so
   int nusselt_arcs =
       0;  ///< above 0: nusselt_factor with as many chords in place of Lambert's formula
+  double absolute_tolerance_m2 = 0.0;  ///< suffices, too
 };
 
 struct VisibleExchange {

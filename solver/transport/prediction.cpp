@@ -2,6 +2,7 @@
 #include "transport/prediction.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "transport/direct_light.h"
@@ -137,6 +138,7 @@ void solve_with_near_sources(
   const BandMatrix indirect = std::move(grid.indirect) + missing;
   // What they add is small and need not be known to more digits than the whole.
   SolveOptions rest = task.solve;
+  rest.method = SolveMethod::conjugate_gradient;  // less than nothing may be missing: no shooting
   const Eigen::ArrayXd part = more.cwiseAbs().colwise().maxCoeff().transpose();
   const Eigen::ArrayXd whole = reflected.cwiseAbs().colwise().maxCoeff().transpose();
   rest.relative_bound = std::clamp(
@@ -154,7 +156,8 @@ void solve_with_near_sources(
   const double row_sum = std::max(1.0, grid.form_factors.row_sum_max);
   for (Index k = 0; k < first.error_bound.size(); ++k) {
     const double q = task.rho.col(k).maxCoeff() * row_sum;
-    grid.solve.error_bound[k] += (1.0 + 2.0 * q / (1.0 - q)) * first.error_bound[k];
+    grid.solve.error_bound[k] += q < 1.0 ? (1.0 + 2.0 * q / (1.0 - q)) * first.error_bound[k]
+                                         : std::numeric_limits<double>::infinity();
   }
 }
 

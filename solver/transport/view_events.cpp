@@ -30,6 +30,10 @@ class EventFinder {
 
   std::vector<ViewEvent> run(std::span<const ConvexOccluder* const> solids) {
     for (const ConvexOccluder* solid : solids) cut_by_solid(*solid);
+    // A corner of one before an edge of another: a gap between them opens or closes.
+    for (const ConvexOccluder* near : solids)
+      for (const ConvexOccluder* far : solids)
+        if (near != far) cut_by_two(*near, *far);
     return std::move(events_);
   }
 
@@ -109,22 +113,60 @@ class EventFinder {
       if (sides.back() == 3) cut_by_plane(face);
     }
     const Polygon& s = source_.vertices;
+    const Outline outline = outline_of(solid);
+    for (const ConvexOccluder::Edge& edge : outline.edges)
+      for (const Vec3& q : s) shadow_of_edge(q, edge.a, edge.b, false);
+    for (const Vec3& corner : outline.corners)
+      for (std::size_t l = 0; l < s.size(); ++l)
+        source_edge_through(corner, s[l], s[(l + 1) % s.size()], false);
+  }
+
+  // What may be on the outline of a solid from somewhere on the receiver.
+  struct Outline {
+    std::vector<ConvexOccluder::Edge> edges;
     std::vector<Vec3> corners;
+  };
+
+  Outline outline_of(const ConvexOccluder& solid) const {
+    std::vector<int> sides;
+    for (const Plane& face : solid.faces) sides.push_back(sides_of(face));
+    Outline outline;
     for (const ConvexOccluder::Edge& edge : solid.edges) {
       const int left = sides[edge.left], right = sides[edge.right];
-      if (left == right && left != 3) continue;  // no outline from anywhere
-      for (const Vec3& q : s) shadow_of_edge(q, edge.a, edge.b, false);
-      corners.push_back(edge.a);
-      corners.push_back(edge.b);
+      if (left == right && left != 3) continue;
+      outline.edges.push_back(edge);
+      outline.corners.push_back(edge.a);
+      outline.corners.push_back(edge.b);
     }
     const auto before = [](const Vec3& a, const Vec3& b) {
       return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
     };
-    std::sort(corners.begin(), corners.end(), before);
-    corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
-    for (const Vec3& corner : corners)
-      for (std::size_t l = 0; l < s.size(); ++l)
-        source_edge_through(corner, s[l], s[(l + 1) % s.size()], false);
+    std::sort(outline.corners.begin(), outline.corners.end(), before);
+    outline.corners.erase(std::unique(outline.corners.begin(), outline.corners.end()),
+                          outline.corners.end());
+    return outline;
+  }
+
+  void cut_by_two(const ConvexOccluder& near, const ConvexOccluder& far) {
+    const Outline before = outline_of(near), behind = outline_of(far);
+    for (const Vec3& corner : before.corners)
+      for (const ConvexOccluder::Edge& edge : behind.edges)
+        if (crosses_source(corner, edge)) source_edge_through(corner, edge.a, edge.b, false);
+    for (const Vec3& corner : behind.corners)
+      for (const ConvexOccluder::Edge& edge : before.edges)
+        if (crosses_source(corner, edge)) shadow_of_edge(corner, edge.a, edge.b, false);
+  }
+
+  // Whether the plane of a corner and an edge meets the source at all.
+  bool crosses_source(const Vec3& corner, const ConvexOccluder::Edge& edge) const {
+    const Vec3 normal = (edge.a - corner).cross(edge.b - corner);
+    bool front = false, back = false;
+    for (const Vec3& v : source_.vertices) {
+      const double height = normal.dot(v - corner);
+      front |= height >= 0.0;
+      back |= height <= 0.0;
+    }
+    return front && back;
   }
 
   // From the source's corner q, edge a-b casts its shadow on the receiver.

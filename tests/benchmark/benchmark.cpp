@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -87,6 +88,63 @@ void print(const ClosedBox& c) {
              100.0 * c.rms_standard_error, 100.0 * c.mean_bound, 100.0 * c.covered);
 }
 
+nlohmann::json as_json(const FormFactorRows& f) {
+  return {{"elements", f.elements},
+          {"threads", f.threads},
+          {"points", f.points},
+          {"tolerance", f.tolerance},
+          {"cpu_s", f.cpu_s},
+          {"wall_s", f.wall_s},
+          {"pairs_per_s", f.pairs / f.cpu_s},
+          {"row_sum_rms_error", f.row_sum_rms_error},
+          {"row_sum_max_error", f.row_sum_max_error},
+          {"buried_rows", f.buried_rows},
+          {"row_difference", f.row_difference},
+          {"memory_bytes", f.memory_bytes}};
+}
+
+// View3D on the same scene and kind of machine, one thread: time and rms error of row sums; and
+// the setting that takes less of both here.
+struct View3D {
+  std::size_t elements;
+  double time_s, rms_error;
+  int points = 3;
+  double tolerance = 1e-4;
+};
+constexpr View3D kView3D[] = {{497, 1.3, 1.7e-4},
+                              {988, 4.1, 1.1e-4},
+                              {2018, 16.8, 5.7e-5, 4},
+                              {5005, 117.0, 6.6e-5, 3, 3e-4}};
+
+// All pairs of the closed box next to the field's program. Its time is scaled by the pairs.
+void compare_form_factors(const std::string& reference, nlohmann::json& json) {
+  fmt::print(
+      "\nForm factors of the closed box without rays, rows before any repair\n"
+      "{:>9}{:>8}{:>8}{:>11}{:>9}{:>9}{:>9}{:>10}{:>10}{:>8}{:>12}{:>9}{:>10}{:>8}\n",
+      "elements", "threads", "points", "tolerance", "CPU / s", "wall / s", "Mpairs/s", "rms", "max",
+      "buried", "off by hand", "B / pair", "View3D rms", "x time");
+  const auto line = [&](const View3D& other, int threads, int points, double tolerance, int rows) {
+    const FormFactorRows f =
+        measure_form_factor_rows(reference, other.elements, threads, points, tolerance, rows);
+    const double scaled = std::pow(static_cast<double>(f.elements) / other.elements, 2);
+    const double n = static_cast<double>(f.elements);
+    fmt::print(
+        "{:>9}{:>8}{:>8}{:>11.0e}{:>9.3f}{:>9.3f}{:>9.2f}{:>10.1e}{:>10.1e}{:>8}{:>12.1e}{:>9.2f}"
+        "{:>10.1e}{:>8.0f}\n",
+        f.elements, threads, points, tolerance, f.cpu_s, f.wall_s, 1e-6 * f.pairs / f.cpu_s,
+        f.row_sum_rms_error, f.row_sum_max_error, f.buried_rows, f.row_difference,
+        static_cast<double>(f.memory_bytes) / (n * n), other.rms_error,
+        other.time_s * scaled / f.cpu_s);
+    std::fflush(stdout);
+    json["form_factor_rows"].push_back(as_json(f));
+  };
+  for (int threads : {1, 2})
+    for (const View3D& other : kView3D)
+      line(other, threads, other.points, other.tolerance, threads == 1 ? 8 : 0);
+  line({497, 63.0, 2.3e-6}, 1, 0, 1e-6, 0);
+  line({497, 63.0, 2.3e-6}, 1, 0, 1e-9, 8);
+}
+
 void print(const Kernels& k) {
   fmt::print("\nKernels, {} elements, {} bands\n", k.elements, k.bands);
   const auto line = [](const char* name, double value, const char* unit) {
@@ -141,6 +199,30 @@ nlohmann::json as_json(const PictureBenchmark& pictures) {
   return json;
 }
 
+std::vector<LinkGrowth> print_links(const truebox::Scene& closed_box) {
+  fmt::print(
+      "\nLinks and the full matrix (outlines), one thread\n{:>26}{:>10}{:>10}{:>10}{:>10}{:>10}"
+      "{:>10}{:>10}{:>10}{:>10}\n",
+      "scene", "tolerance", "elements", "links", "MiB", "CPU / s", "MiB", "CPU / s", "estimate",
+      "error");
+  std::vector<LinkGrowth> rows;
+  const auto add = [&rows](const LinkGrowth& r) {
+    fmt::print("{:>26}{:>10.2g}{:>10}{:>10}{:>10}{:>10.2f}{:>10}{:>10.2f}{:>10.1e}{:>10.1e}\n",
+               r.scene.substr(0, 25), r.tolerance, r.elements, r.links, r.links_bytes >> 20,
+               r.links_s, r.matrix_bytes >> 20, r.matrix_s, r.estimate, r.error);
+    std::fflush(stdout);
+    rows.push_back(r);
+  };
+  constexpr std::size_t kLargestMatrix = 6000;
+  for (double tolerance : {1e-2, 3e-3})
+    for (std::size_t count : {600u, 1200u, 2400u, 5000u, 10000u, 20000u})
+      add(measure_links("closed box", closed_box, count, tolerance, count < kLargestMatrix));
+  for (std::size_t count : {3400u, 10000u, 25000u, 50000u})
+    add(measure_links("museum of more rooms", museum_of(count), count, 0.1, false));
+  for (std::size_t count : {128u, 512u, 2048u}) add(measure_facing_squares(count));
+  return rows;
+}
+
 void print(const std::vector<SolverWork>& solvers) {
   fmt::print("\nPasses over the matrix to a relative bound\n{:>12}{:>16}{:>16}{:>22}\n", "bound",
              "krylov", "gauss-seidel", "time, krylov = 1");
@@ -169,10 +251,15 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   program.add_option("--json", json_path, "also write every number as JSON");
   program.add_option("--reference", reference, "the folder of reference data");
-  bool only_pictures = false;
+  bool only_pictures = false, only_form_factors = false;
+  program.add_flag("--only-form-factors", only_form_factors, "all pairs next to View3D, no more");
   std::vector<int> samples{16, 64, 256, 1024};
   program.add_flag("--only-pictures", only_pictures, "radiosity against path tracing, no more");
   program.add_option("--samples", samples, "paths a pixel")->delimiter(',');
+  bool only_links = false;
+  std::string links_picture;
+  program.add_flag("--only-links", only_links, "links against elements, no more");
+  program.add_option("--links-svg", links_picture, "draw them into this file");
   CLI11_PARSE(program, argc, argv);
 
   const auto scene =
@@ -182,6 +269,12 @@ int main(int argc, char** argv) {
         truebox::in_bands_at(scene, {400.0, 452.0, 500.0, 552.0, 600.0, 652.0, 700.0}), elements,
         samples);
   };
+  if (only_links) {
+    const auto rows = print_links(truebox::read_scene(std::filesystem::path(reference) /
+                                                      "independent_renders" / "closed_box.toml"));
+    if (!links_picture.empty()) std::ofstream(links_picture) << links_svg(rows) << '\n';
+    return 0;
+  }
   if (only_pictures) {
     print(pictures());
     return 0;
@@ -189,6 +282,16 @@ int main(int argc, char** argv) {
   nlohmann::json json{{"threads", std::thread::hardware_concurrency()},
                       {"compiler", __VERSION__},
                       {"scene", "cornell_box"}};
+  const auto kernels_of_all = [&] {
+    const Kernels kernels = measure_kernels(scene, kernel_elements);
+    print(kernels);
+    json["kernels"] = as_json(kernels);
+  };
+  if (only_form_factors) {
+    compare_form_factors(reference, json);
+    kernels_of_all();
+    return 0;
+  }
   fmt::print(
       "Irradiance against independent path tracing, relative, in %\n"
       "{:>9}{:>10}{:>9}{:>12}{:>12}{:>12}{:>12}{:>11}\n",
@@ -228,9 +331,8 @@ int main(int argc, char** argv) {
       json["closed_box_hierarchical"].push_back(as_json(box));
     }
   if (only_closed_box) return 0;
-  const Kernels kernels = measure_kernels(scene, kernel_elements);
-  print(kernels);
-  json["kernels"] = as_json(kernels);
+  compare_form_factors(reference, json);
+  kernels_of_all();
   const auto solvers = measure_solvers(scene, kernel_elements, {1e-2, 1e-4, 1e-7, 1e-12});
   print(solvers);
   for (const SolverWork& work : solvers) json["solvers"].push_back(as_json(work));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <ctime>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -26,6 +27,15 @@ double best_seconds(const Work& work, int repetitions = 5) {
   double best = std::numeric_limits<double>::infinity();
   for (int i = 0; i < repetitions; ++i) best = std::min(best, seconds(work));
   return best;
+}
+
+/// Processor time of one call, all threads, s: what a busy machine does not change.
+template <class Work>
+double processor_seconds(const Work& work) {
+  const auto now = [] { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; };
+  const double start = now();
+  work();
+  return now() - start;
 }
 
 /// A prediction of the Cornell Box against independent path tracing, relative to the irradiance,
@@ -61,6 +71,26 @@ struct ClosedBox {
 };
 ClosedBox measure_closed_box(const std::filesystem::path& reference_dir, std::size_t elements,
                              int threads, FormFactorMethod method, double link_tolerance = 0.0);
+
+/// Form factors of all pairs of the closed box, without rays, before any repair: rows must sum
+/// to 1.
+struct FormFactorRows {
+  std::size_t elements = 0;
+  int threads = 1;
+  int points = 0;          ///< of partly hidden pairs, along one direction; 0: adaptive
+  double tolerance = 0.0;  ///< for more points, or of adaptive visibility
+  double cpu_s = 0.0, wall_s = 0.0;
+  double pairs = 0.0;
+  double row_sum_rms_error = 0.0;  ///< area-weighted
+  double row_sum_max_error = 0.0;
+  std::size_t buried_rows = 0;  ///< patches under a block, which see nothing; all others count
+  /// Largest sum over a row of |F_ij - brute force|, some rows; brute force is good to some 1e-3.
+  double row_difference = 0.0;
+  std::size_t memory_bytes = 0;  ///< by which the largest resident set grew
+};
+FormFactorRows measure_form_factor_rows(const std::filesystem::path& reference_dir,
+                                        std::size_t elements, int threads, int points,
+                                        double tolerance, int rows_compared);
 
 /// What the machine does, and what the program makes of it.
 struct Kernels {
@@ -101,5 +131,24 @@ struct PictureBenchmark {
 };
 PictureBenchmark measure_pictures(const Scene& scene, const std::vector<std::size_t>& elements,
                                   const std::vector<int>& samples);
+
+/// Links of one mesh and tolerance, and the full matrix of the same mesh: finding and solving in
+/// the scene's bands, one thread.
+struct LinkGrowth {
+  std::string scene;
+  double tolerance = 0.0;
+  std::size_t elements = 0, links = 0;
+  std::size_t links_bytes = 0, matrix_bytes = 0;
+  double links_s = 0.0, matrix_s = 0.0;  ///< processor time; matrix 0: not asked for
+  double estimate = 0.0;  ///< of what links leave out, rms relative to the mean irradiance
+  double error = 0.0;     ///< the same against the matrix
+};
+LinkGrowth measure_links(const std::string& name, const Scene& scene, std::size_t elements,
+                         double tolerance, bool with_matrix);
+/// The caveat (Garmann 1995): two fixed patches and a tolerance of 0 link every pair.
+LinkGrowth measure_facing_squares(std::size_t elements);
+Scene museum_of(std::size_t patches);
+/// Links against elements, a curve a scene and tolerance in the order of the rows.
+std::string links_svg(const std::vector<LinkGrowth>& rows);
 
 }  // namespace truebox::benchmark

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 #include <random>
+#include <stdexcept>
+#include <string>
 
 #include "mesh/wachspress.h"
 #include "support/cornell_box.h"
@@ -135,6 +137,20 @@ TEST(DiscontinuityCells, LeaveTheSmoothFieldWithoutCracks) {
   // Quadratics through random means reach a thousand times as high where elements are thin.
   EXPECT_LT(worst_crack(mesh, field, edges), 1e-4);
   EXPECT_GT(edges, mesh.size());
+}
+
+TEST(LinesOfLight, OfTooManyLampsAreRefusedWithTheirNumber) {
+  Scene scene = tiny::grey_scene(0.5, 1.0);
+  for (int k = 0; k < 1100; ++k) {
+    const double x = 2.0 * k;
+    tiny::add_surface(scene, "lamp", {{x, 0, 0}, {x + 1, 0, 0}, {x + 1, 1, 0}, {x, 1, 0}});
+  }
+  try {
+    lines_of_light(scene, {});
+    FAIL() << "1100 lamps on 1100 surfaces";
+  } catch (const std::length_error& error) {
+    EXPECT_NE(std::string(error.what()).find("1100 luminaires"), std::string::npos);
+  }
 }
 
 // Direct light at the corners, linear between them (as .vtu, .glb and the walkthrough show it):

@@ -173,6 +173,22 @@ TEST(PredictAdaptively, ServesAFittedReflectance) {
   EXPECT_LT(error[1], 0.75 * error[0]);  // half was seen, with 1000 elements too
 }
 
+TEST(InverseIrradiance, OfRmsIrradianceIsOneOverTheMeanEverywhere) {
+  const Scene scene = lit_cube();
+  const PatchMesh mesh = uniform_mesh(scene, 0.5);
+  const auto n = static_cast<Index>(mesh.size());
+  BandMatrix irradiance(n, 1);
+  for (Index i = 0; i < n; ++i) irradiance(i, 0) = i % 2 == 0 ? 1.5 : 0.5;  // equal areas
+  const std::vector<char> counts(mesh.size(), 1);
+  const BandMatrix absolute =
+      inverse_irradiance(goal_of_name("irradiance", scene), mesh, counts, irradiance);
+  const BandMatrix relative = inverse_irradiance({}, mesh, counts, irradiance);
+  for (Index i = 0; i < n; ++i) {
+    EXPECT_NEAR(absolute(i, 0), 1.0, 1e-14);
+    EXPECT_NEAR(relative(i, 0), 1.0 / irradiance(i, 0), 1e-14);
+  }
+}
+
 TEST(DualSource, OfAParameterReadsBackAChangeOfItsReflectance) {
   const Scene scene = room_with_red_wall();
   const PatchMesh mesh = uniform_mesh(scene, 0.25);
