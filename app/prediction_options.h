@@ -36,7 +36,7 @@ struct PredictionArguments {
   std::string adaptive;          ///< empty: uniform; else the goal, or kDefaultGoal
   bool discontinuities = false;  ///< elements follow lines of light and shadow
   std::size_t bands = 0;         ///< lamp-weighted ones instead of the scene's; 0: the scene's
-  std::string automatic;         ///< empty: as said here; else as planned, for a goal or kDefaultGoal
+  std::string automatic;  ///< empty: as said here; else as planned, for a goal or kDefaultGoal
   bool error_shares = false, sensitivities = false;  ///< as in PredictOptions
   SolveGrid solve_grid;                              ///< as in PredictOptions, and:
   decltype(PredictOptions::watch_finest) watch_finest;

@@ -187,6 +187,7 @@ class Planner {
                (is_adapted ? "adapted, " : "uniform, ") + count(plan_.elements) + " elements",
                std::move(why)};
     d.left_out = is_adapted ? "small elements where the light is even" : "adaptive subdivision";
+    if (plan_.needs.occlusion) d.left_out += ", elements along lines of shadow (--discontinuities)";
     d.work = "elements";
     d.planned_work = wanted;
     d.full_work = uniform_elements;
