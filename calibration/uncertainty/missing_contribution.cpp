@@ -111,6 +111,10 @@ std::string MissingContribution::in_words() const {
     words += "missing is a relative contribution: the scale of standards, gain or illumination.";
   else if (slope_counts)
     words += "missing are an additive contribution and one of the scale.";
+  else if (one_sided)
+    words +=
+        "missing is a common contribution, and these readings do not tell an offset (black "
+        "level, veil) from a scale (standards, illumination).";
   else
     words += "neither an offset nor a scale explains it; single readings do.";
   return words + " It is not added: sized on these readings it would make them agree.";
