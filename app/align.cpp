@@ -6,12 +6,16 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "align_chessboard.h"
 #include "align_files.h"
+#include "align_light.h"
+#include "align_render.h"
 #include "commands.h"
 #include "document/writers.h"
 #include "image/image_file.h"
+#include "prediction_options.h"
 #include "radiometry/input_error.h"
 #include "radiometry/table_file.h"
 #include "scene/scene_file.h"
@@ -20,9 +24,11 @@ namespace truebox::app {
 namespace {
 
 struct AlignArguments {
-  std::vector<std::string> files;  // SCENE PHOTO, or photographs of a chessboard
+  std::vector<std::string> files;  // SCENE or RENDER and PHOTO, or photographs of a chessboard
   ChessboardArguments chessboard;
-  std::string scene, photograph, camera, points, directory = "aligned";
+  RenderOptionsOfAlign render;
+  LightArguments light;
+  std::string photograph, points, directory = "aligned";
   std::string lens = "radial";
   AlignmentOptions options;
   bool no_search = false;
@@ -47,17 +53,6 @@ std::vector<PointObservation> read_picked_points(const std::string& path, double
     points.push_back(std::move(point));
   }
   return points;
-}
-
-const CameraDescription& camera_of(const Scene& scene, std::string& name) {
-  if (name.empty() && scene.cameras.size() == 1) name = scene.cameras.begin()->first;
-  const auto found = scene.cameras.find(name);
-  if (found == scene.cameras.end())
-    throw InputError(scene.path, 0, "[cameras." + (name.empty() ? "NAME" : name) + "] as the guess",
-                     scene.cameras.empty() ? "no camera"
-                                           : std::to_string(scene.cameras.size()) +
-                                                 " other cameras; choose with --camera");
-  return found->second;
 }
 
 void print_found(const BoxAlignment& found) {
@@ -91,6 +86,40 @@ void print_found(const BoxAlignment& found) {
     }
 }
 
+AlignmentSubject read_subject(const AlignArguments& a) {
+  if (is_picture_file(a.files[0])) return read_render(a.files[0], a.render);
+  const auto belongs_to_render = [&](const char* option, const std::string& value) {
+    if (!value.empty())
+      throw InputError(a.files[0], 0, std::string("a render with ") + option, "a scene file");
+  };
+  belongs_to_render("--scene", a.render.scene);
+  belongs_to_render("--aov", a.render.aovs);
+  AlignmentSubject subject;
+  subject.path = a.files[0];
+  subject.scene = read_scene(a.files[0]);
+  subject.guess = find_camera(*subject.scene, a.render.camera);
+  return subject;
+}
+
+void write_results(const AlignArguments& a, const AlignmentSubject& subject,
+                   const BoxAlignment& found, const Image& photograph,
+                   const PhotometricRefinement* light) {
+  const std::filesystem::path directory = a.directory;
+  write_file_atomically(directory / "alignment.json",
+                        alignment_json(found, subject, a.photograph, light));
+  const Picture overlay = alignment_overlay(found, photograph);
+  write_file_atomically(directory / "overlay.png", overlay.png.data(), overlay.png.size());
+  write_report(directory, alignment_report(found, subject, photograph, a.photograph, light));
+  if (found.outcome != AlignmentOutcome::converged) return;
+  if (subject.view)
+    write_mapping(directory, *subject.view, light ? light->parameters : found.parameters,
+                  photograph, a.photograph);
+  if (subject.kind() == "print") return;  // no camera of any scene
+  write_file_atomically(directory / "camera.toml",
+                        camera_toml(light ? light->camera : found.camera, "aligned",
+                                    subject.scene ? subject.scene->metres_per_unit : 1.0));
+}
+
 int align(AlignArguments a) {
   if (!a.chessboard.corners.empty()) {
     a.chessboard.photographs = a.files;
@@ -98,13 +127,14 @@ int align(AlignArguments a) {
     return calibrate_from_chessboard(a.chessboard);
   }
   if (a.files.size() != 2)
-    throw InputError("align", 0, "a scene file and a photograph",
+    throw InputError("align", 0, "a scene file or a render, and a photograph",
                      std::to_string(a.files.size()) + " files");
-  a.scene = a.files[0];
   a.photograph = a.files[1];
-  const Scene scene = read_scene(a.scene);
-  const CameraDescription guess = camera_of(scene, a.camera);
-  if (!a.points.empty()) a.options.points = read_picked_points(a.points, scene.metres_per_unit);
+  const AlignmentSubject subject = read_subject(a);
+  if (!a.points.empty()) {
+    if (!subject.scene) throw InputError(a.points, 0, "a scene with picked points", "a render");
+    a.options.points = read_picked_points(a.points, subject.scene->metres_per_unit);
+  }
   const Image photograph = read_image(a.photograph);
   a.options.lens = a.lens == "fixed"  ? LensFreedom::fixed
                    : a.lens == "full" ? LensFreedom::full
@@ -114,19 +144,33 @@ int align(AlignArguments a) {
   a.options.progress = [&](const std::string& stage, double share) {
     if (terminal) fmt::print(stderr, "\r\033[K{} {:.0f} %", stage, 100.0 * share);
   };
-  const BoxAlignment found = align_box(scene, guess, photograph, a.options);
+  const BoxAlignment found = align_subject(subject, photograph, a.options);
+  std::optional<PhotometricRefinement> light;
+  if (a.light.wanted)
+    light = refine_by_light(a.light, subject, found, photograph, a.options.progress);
   if (terminal) fmt::print(stderr, "\r\033[K");
-  const std::filesystem::path directory = a.directory;
-  write_file_atomically(directory / "alignment.json", alignment_json(found, scene, a.photograph));
-  const Picture overlay = alignment_overlay(found, photograph);
-  write_file_atomically(directory / "overlay.png", overlay.png.data(), overlay.png.size());
-  write_report(directory, alignment_report(found, scene, photograph, a.photograph));
-  if (found.outcome == AlignmentOutcome::converged)
-    write_file_atomically(directory / "camera.toml",
-                          camera_toml(found.camera, "aligned", scene.metres_per_unit));
+  write_results(a, subject, found, photograph, light ? &*light : nullptr);
   print_found(found);
-  fmt::print("\n{}\n", (directory / "report.html").string());
-  return found.outcome == AlignmentOutcome::converged ? kAgrees : kNotSolved;
+  if (light) print_light(*light);
+  fmt::print("\n{}\n", (std::filesystem::path(a.directory) / "report.html").string());
+  if (found.outcome != AlignmentOutcome::converged) return kNotSolved;
+  return light && light->outcome != AlignmentOutcome::converged ? kWarning : kAgrees;
+}
+
+void add_light_options(CLI::App& command, LightArguments& light) {
+  auto* wanted = command.add_flag(
+      "--photometric", light.wanted,
+      "then refine the camera by the light between the edges: of the RENDER, or of a prediction");
+  command.add_option("--gains", light.gains, "gain and offset free for each band, or each surface")
+      ->check(CLI::IsMember({"band", "surface"}))
+      ->capture_default_str()
+      ->needs(wanted);
+  command.add_option("--mask", light.mask, "image of the photograph's size, 0: pixel not used")
+      ->needs(wanted);
+  command.add_option("--elements", light.elements, "of the prediction for a scene")
+      ->check(CLI::Range(std::size_t{50}, std::size_t{1000000}))
+      ->capture_default_str()
+      ->needs(wanted);
 }
 
 }  // namespace
@@ -138,14 +182,22 @@ void add_align_command(CLI::App& program, Action& chosen) {
   command
       ->add_option("FILES", a->files,
                    "SCENE PHOTO: a scene file with the box and a camera as the guess, and a "
-                   "photograph of that box; or IMAGES of a --chessboard")
+                   "photograph of that box; RENDER PHOTO: a picture of the box, its camera as the "
+                   "guess; or IMAGES of a --chessboard")
       ->required();
   auto* chessboard =
       command->add_option("--chessboard", a->chessboard.corners,
                           "inner corners of a board, 9x6: lens from photographs of it");
   command->add_option("--square", a->chessboard.square, "length of its squares, 25mm")
       ->needs(chessboard);
-  command->add_option("--camera", a->camera, "the guess, a camera of the scene file");
+  command->add_option("--camera", a->render.camera, "the guess, a camera of the scene file");
+  command->add_option("--scene", a->render.scene,
+                      "of a RENDER that does not say which scene it shows, or another one");
+  command->add_option("--aov", a->render.aovs,
+                      "where a RENDER's pixels lie (render --aov): the edges sought are then the "
+                      "render's own, shadows' among them; without scene or AOVs a RENDER is taken "
+                      "for a flat print");
+  add_light_options(*command, a->light);
   command->add_option("-o,--output", a->directory, "directory to write into")
       ->capture_default_str();
   command->add_option("--lens", a->lens, "distortion to estimate: fixed, radial (k1 k2), full")
@@ -183,11 +235,13 @@ void add_align_command(CLI::App& program, Action& chosen) {
       "Example:\n"
       "  truebox render reference/cornell_box/cornell_box.toml --camera front -o box.exr\n"
       "  truebox align reference/cornell_box/cornell_box.toml box.exr --camera front -o aligned\n"
+      "  truebox align box.exr photograph.jpg --photometric -o aligned\n"
       "  truebox align --chessboard 9x6 --square 25mm reference/chessboard_opencv/left*.jpg -o "
       "lens\n"
-      "writes alignment.json, camera.toml, overlay.png, report.html; exit code 5 if the "
-      "photograph\n"
-      "shows no such box or does not determine the camera");
+      "writes alignment.json, camera.toml, overlay.png, report.html; for a render also\n"
+      "photo_from_render.exr and photograph.exr, the photograph in the render's pixels. Exit code\n"
+      "5 if the photograph shows no such box or does not determine the camera, 1 if the light\n"
+      "contradicts the edges (their camera is kept)");
   command->callback([a, &chosen] { chosen = [a] { return align(*a); }; });
 }
 

@@ -89,12 +89,14 @@ Table border_table(const BoxAlignment& found) {
 
 }  // namespace
 
-std::string alignment_json(const BoxAlignment& found, const Scene& scene,
-                           const std::string& photograph) {
+std::string alignment_json(const BoxAlignment& found, const AlignmentSubject& subject,
+                           const std::string& photograph, const PhotometricRefinement* light) {
   json out{{"outcome", to_string(found.outcome)},
            {"message", found.message},
            {"null_direction", found.null_direction},
-           {"scene", scene.path},
+           {"aligned_to", subject.kind()},
+           {"file", subject.path},
+           {"scene", subject.scene ? json(subject.scene->path) : json(nullptr)},
            {"photograph", photograph},
            {"pixels", found.camera.pixels},
            {"matched_share", found.matched_share},
@@ -128,13 +130,16 @@ std::string alignment_json(const BoxAlignment& found, const Scene& scene,
                       {"held_out_rms_px", number(found.held_out_rms_px)},
                       {"cross_validated_rms_px", number(found.cross_validated_rms_px)},
                       {"scatter_beyond_noise_px", found.excess_u_px},
-                      {"correlation_along_edges", found.correlation},
+                      {"error_of_each_piece_px", found.errors.white_u_px},
+                      {"error_along_edges_px", found.errors.wave_u_px},
+                      {"error_along_edges_length_px", found.errors.wave_length_px},
                       {"blur_px", found.blur_px},
                       {"points_px", found.point_residuals_px}};
   out["borders"] = json::array();
   for (const BorderStatistics& b : found.borders) out["borders"].push_back(border_json(b));
   out["pieces"] = json::array();
   for (const EdgeMatch& m : found.matches) out["pieces"].push_back(match_json(m));
+  if (light) out["light"] = light_json(*light);
   return out.dump(1) + "\n";
 }
 
@@ -164,18 +169,21 @@ Picture alignment_overlay(const BoxAlignment& found, const Image& photograph, in
                   factor));
 }
 
-Report alignment_report(const BoxAlignment& found, const Scene& scene, const Image& photograph,
-                        const std::string& photograph_path) {
+Report alignment_report(const BoxAlignment& found, const AlignmentSubject& subject,
+                        const Image& photograph, const std::string& photograph_path,
+                        const PhotometricRefinement* light) {
   Report report;
-  report.title = "Camera from the edges of a box";
-  report.subtitle = fmt::format("{} against {}", scene.path, photograph_path);
+  report.title = subject.kind() == "print" ? "Photograph registered to a picture"
+                 : subject.edges_of_view   ? "Camera from the edges of a render"
+                                           : "Camera from the edges of a box";
+  report.subtitle = fmt::format("{} against {}", subject.path, photograph_path);
   const Agreement agreement = agreement_of(found.outcome);
   const bool good = agreement == Agreement::agrees;
-  report.verdict = {agreement,
-                    good ? fmt::format("The scene's edges are found in the photograph: {:.0f} % of "
-                                       "them, {:.3g} px rms.",
-                                       100.0 * found.matched_share, found.rms_px)
-                         : found.message};
+  report.verdict = {
+      agreement, good ? fmt::format("The predicted edges are found in the photograph: {:.0f} % of "
+                                    "them, {:.3g} px rms.",
+                                    100.0 * found.matched_share, found.rms_px)
+                      : found.message};
   report.checks = {{"predicted edges found", agreement, found.matched_share, 0.6, "",
                     "share of the predicted pieces of edge that the photograph has there"}};
   report.key_numbers = {{"edges found", 100.0 * found.matched_share, "%"}};
@@ -185,6 +193,11 @@ Report alignment_report(const BoxAlignment& found, const Scene& scene, const Ima
                                   "px", 3, "rms, cross-validated"});
     if (std::isfinite(found.held_out_rms_px))
       report.key_numbers.push_back({"residual, held out", found.held_out_rms_px, "px", 3, "rms"});
+  }
+  if (light) {
+    report.checks.push_back(light_check(*light));
+    if (good && report.checks.back().outcome == Agreement::warning)
+      report.verdict = {Agreement::warning, report.verdict.sentence + " " + light->message + "."};
   }
   Section pictures{"Overlay", {}};
   pictures.blocks.push_back(
@@ -197,14 +210,23 @@ Report alignment_report(const BoxAlignment& found, const Scene& scene, const Ima
     report.sections.push_back({"Edges", {border_table(found)}});
     report.sections.push_back(
         {"Parameters",
-         {Paragraph{fmt::format(
-              "Scatter of the residuals beyond the pixels' own noise: {:.3g} px (shape of the box, "
-              "lens, shading); it is in the uncertainties, and so is the correlation of residuals "
-              "along an edge, over {} neighbouring pieces.",
-              found.excess_u_px, found.correlation.size())},
+         {Paragraph{fmt::format("Errors of the edges beyond the pixels' own noise (shape of the "
+                                "box, lens, shading), as "
+                                "the residuals tell: {:.3g} px from piece to piece, {:.3g} px in "
+                                "waves along an edge, "
+                                "correlated over some {:.3g} px. Both are in the uncertainties.",
+                                found.errors.white_u_px, found.errors.wave_u_px,
+                                found.errors.wave_length_px)},
           parameter_table(found)}});
   }
-  report.provenance = {{"scene", scene.path}, {"photograph", photograph_path}};
+  if (good && subject.kind() == "print")
+    report.sections.back().blocks.push_back(
+        Paragraph{"The render says nothing of where its pixels lie: it is taken for a print 1 m in "
+                  "front of the camera. Pose and focal length stand for the registration of the "
+                  "whole picture; they are no camera of the scene."});
+  if (light) report.sections.push_back(light_section(*light));
+  report.provenance = {{subject.kind(), subject.path}, {"photograph", photograph_path}};
+  if (subject.view && subject.scene) report.provenance.push_back({"scene", subject.scene->path});
   return report;
 }
 

@@ -254,8 +254,9 @@ std::string describe(const Predicted& p) {
                     p.adapt_steps.size(), p.adapt_steps.front().cells, p.adapt_steps.back().cells);
   if (const auto& lines = p.lines)
     text += fmt::format(
-        "  elements follow {} lines of contact, {} across which the slope of direct light jumps, "
-        "{} its curvature; {} weaker ones are left out\n",
+        "  elements follow {} lines of contact, {} across which the slope of direct light jumps "
+        "and "
+        "{} its curvature, close ones as one; {} weaker ones are left out\n",
         lines->of_order[0], lines->of_order[1], lines->of_order[2], lines->left_out);
   if (grid.links)
     text += describe_links(*p.prediction);

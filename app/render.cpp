@@ -13,6 +13,7 @@
 #include <memory>
 #include <optional>
 
+#include "camera_attribute.h"
 #include "commands.h"
 #include "image/image_file.h"
 #include "image/spectral_image.h"
@@ -91,10 +92,16 @@ std::string write_picture(const RenderArguments& a, const Scene& scene, Image& r
   add_display_channels(radiance, scene.bands, observer);
   follow_lamps(radiance, scene, observer);
   radiance.attributes["source"] = "truebox " + how + " (simulated) of " + scene.path;
+  note_camera(radiance, scene, camera_of(scene, a));
   if (wants_counts(a.sensor, a.output))
     return write_simulated_photograph(a.sensor, a.output, scene, camera_of(scene, a), radiance);
   write_exr(a.output, radiance);
   return {};
+}
+
+void write_aovs(const RenderArguments& a, const Scene& scene, Image aovs) {
+  note_camera(aovs, scene, camera_of(scene, a));
+  write_exr(a.aovs, aovs);
 }
 
 class Stopwatch {
@@ -127,7 +134,7 @@ int render_radiosity(RenderArguments a) {
   const double seconds = watch.seconds(), share = mean_share(image);
   image.radiance.attributes["errorBound"] = fmt::format("{:.3g} of the mean radiance", share);
   image.error_bound.attributes["source"] = "error bound of " + a.output;
-  if (!a.aovs.empty()) write_exr(a.aovs, render_aovs(*predicted->prediction, camera));
+  if (!a.aovs.empty()) write_aovs(a, predicted->scene, render_aovs(*predicted->prediction, camera));
   const std::string photograph = write_picture(a, predicted->scene, image.radiance, "prediction");
   if (!a.error_bound.empty()) write_exr(a.error_bound, image.error_bound);
   fmt::print("{}  render: {} x {} pixels, {} points each, {} in {} of them, {:.2f} s\n",
@@ -182,7 +189,7 @@ int render_paths(const RenderArguments& a) {
                   image.randomisations, a.seed);
   image.variance.attributes["source"] = "variance of the mean of " + a.output;
   image.variance.attributes["degreesOfFreedom"] = std::to_string(image.randomisations - 1);
-  if (!a.aovs.empty()) write_exr(a.aovs, geometry_aovs(scene, camera));
+  if (!a.aovs.empty()) write_aovs(a, scene, geometry_aovs(scene, camera));
   const std::string photograph = write_picture(a, scene, image.radiance, how);
   if (!a.variance.empty()) write_exr(a.variance, image.variance);
   if (!a.standard_error.empty()) {

@@ -10,6 +10,7 @@ std::string to_string(AlignmentOutcome outcome) {
     case AlignmentOutcome::no_such_box: return "no such box";
     case AlignmentOutcome::not_converged: return "not converged";
     case AlignmentOutcome::rank_deficient: return "rank deficient";
+    case AlignmentOutcome::contradiction: return "contradiction";
     case AlignmentOutcome::converged: return "converged";
   }
   return "unknown";

@@ -13,6 +13,7 @@ enum class AlignmentOutcome {
   no_such_box,      ///< the picture does not show what the scene predicts
   not_converged,
   rank_deficient,  ///< a combination of parameters is not determined; the null direction names it
+  contradiction,   ///< light and edges tell of different cameras
   converged,
 };
 

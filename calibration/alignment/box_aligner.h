@@ -5,19 +5,21 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "alignment/box_alignment.h"
 #include "alignment/edge_field.h"
 #include "alignment/edge_planes.h"
-#include "alignment/scene_edges.h"
+#include "alignment/edge_source.h"
 
 namespace truebox {
 
 class BoxAligner {
  public:
-  BoxAligner(const Scene& scene, const CameraDescription& guess, const Image& photograph,
-             const AlignmentOptions& options);
+  /// `guess` has the photograph's pixels.
+  BoxAligner(std::unique_ptr<EdgeSource> edges, const CameraDescription& guess,
+             const Image& photograph, const AlignmentOptions& options);
 
   BoxAlignment run();
 
@@ -38,11 +40,10 @@ class BoxAligner {
     if (options_.progress) options_.progress(stage, share);
   }
 
-  const Scene& scene_;
+  std::unique_ptr<EdgeSource> edges_;
   CameraDescription like_;
   const AlignmentOptions& options_;
   EdgePlanes planes_;
-  SceneEdges edges_;
   CameraParameters guess_;
   ParameterFreedom full_;
   double half_width_ = 5.0;  // of windows, px of the planes

@@ -6,6 +6,7 @@
 
 #include "alignment/box_aligner.h"
 #include "alignment/pose_search.h"
+#include "alignment/rendered_view.h"
 #include "radiometry/input_error.h"
 
 namespace truebox {
@@ -97,13 +98,11 @@ std::string to_string(EdgeUse use) {
   return "unknown";
 }
 
-BoxAligner::BoxAligner(const Scene& scene, const CameraDescription& guess, const Image& photograph,
-                       const AlignmentOptions& options)
-    : scene_(scene), like_(guess), options_(options), edges_(scene) {
-  require_same_shape(guess, photograph);
+BoxAligner::BoxAligner(std::unique_ptr<EdgeSource> edges, const CameraDescription& guess,
+                       const Image& photograph, const AlignmentOptions& options)
+    : edges_(std::move(edges)), like_(guess), options_(options) {
   planes_ = edge_planes(photograph, options.most_px);
-  like_.pixels = {photograph.width, photograph.height};
-  guess_ = camera_parameters(like_, edges_.centre_m());
+  guess_ = camera_parameters(like_, edges_->centre_m());
   full_ = full_freedom(guess_, options_, photograph.width);
 }
 
@@ -117,21 +116,9 @@ EdgeField BoxAligner::field(int most_px) const {
 
 std::vector<EdgeSample> BoxAligner::samples(const CameraParameters& p,
                                             EdgeSampling sampling) const {
-  const Camera camera(camera_description(p, like_));
-  const bool as_written = p.stretch == std::array{1.0, 1.0, 1.0};
-  std::vector<EdgeSample> found;
-  if (as_written) {
-    found = edges_.visible(camera, sampling);
-  } else {
-    const SceneEdges moved(
-        with_moved_vertices(scene_, [&](const Vec3& v) { return stretched(p, v); }));
-    found = moved.visible(camera, sampling);
-    const Vec3 s(p.stretch[0], p.stretch[1], p.stretch[2]);
-    for (EdgeSample& sample : found)
-      sample.point_m = p.centre_m + (sample.point_m - p.centre_m).cwiseQuotient(s);
-  }
+  std::vector<EdgeSample> found = edges_->visible(p, sampling);
   std::erase_if(found, [&](const EdgeSample& sample) {
-    return is_listed(options_.ignore, edges_.border_name(sample));
+    return is_listed(options_.ignore, edges_->border_name(sample));
   });
   return found;
 }
@@ -146,7 +133,7 @@ CameraParameters BoxAligner::closest(CameraParameters p, const EdgeField& edge_f
     const double reach = radius * scale * (1.0 - 0.67 * round / std::max(1, rounds - 1));
     Observations observations{{}, options_.points};
     for (const EdgeSample& s : predicted) {
-      if (is_listed(options_.hold_out, edges_.border_name(s))) continue;
+      if (is_listed(options_.hold_out, edges_->border_name(s))) continue;
       const auto found = edge_field.nearest(s.position, s.normal);
       if (!found || found->distance_px > reach) continue;
       observations.edges.push_back({s.edge,
@@ -199,7 +186,8 @@ BoxAlignment BoxAligner::run() {
   result.parameters = guess_;
   if (from_guess.size() < 8 && options_.points.size() < 4) {
     result.outcome = AlignmentOutcome::invalid_problem;
-    result.message = "the camera of the guess sees no edges of the scene, not even near the film";
+    result.message =
+        "the guess sees no edges of the " + edges_->what() + ", not even near the film";
     return result;
   }
   const bool searched = options_.search && options_.points.size() < 4;
@@ -248,22 +236,33 @@ bool BoxAligner::judge(BoxAlignment& result) const {
   if (options_.points.size() >= 4) return true;  // a person says that it is this box
   result.outcome = AlignmentOutcome::no_such_box;
   if (const std::string far = contradiction(guess_, result.parameters); !far.empty()) {
-    result.message = "the photograph does not show this box near the guess: the best camera " + far;
+    result.message = "the photograph does not show this " + edges_->what() +
+                     " near the guess: the best camera " + far;
     return false;
   }
   if (result.matched_share >= kLeastShare && found >= needed) return true;
-  result.message = "the photograph does not show this box: " + std::to_string(judged.size()) +
-                   " pieces of edge were predicted at the best position, " +
-                   std::to_string(static_cast<int>(100.0 * result.matched_share)) +
-                   " % of them are there (" + std::to_string(found) + " of " +
-                   std::to_string(by_edge.size()) + " edges); 60 % and " + std::to_string(needed) +
-                   " edges are needed";
+  result.message =
+      "the photograph does not show this " + edges_->what() + ": " + std::to_string(judged.size()) +
+      " pieces of edge were predicted at the best position, " +
+      std::to_string(static_cast<int>(100.0 * result.matched_share)) + " % of them are there (" +
+      std::to_string(found) + " of " + std::to_string(by_edge.size()) + " edges); 60 % and " +
+      std::to_string(needed) + " edges are needed";
   return false;
 }
 
 BoxAlignment align_box(const Scene& scene, const CameraDescription& guess, const Image& photograph,
                        const AlignmentOptions& options) {
-  return BoxAligner(scene, guess, photograph, options).run();
+  require_same_shape(guess, photograph);
+  CameraDescription like = guess;
+  like.pixels = {photograph.width, photograph.height};
+  return BoxAligner(edges_of_scene(scene, like), like, photograph, options).run();
+}
+
+BoxAlignment align_picture(const RenderedView& view, const Image& photograph,
+                           const AlignmentOptions& options) {
+  if (!view.is_print()) require_same_shape(view.camera(), photograph);
+  const CameraDescription like = view.camera_for(photograph.width, photograph.height);
+  return BoxAligner(edges_of_picture(view, like), like, photograph, options).run();
 }
 
 }  // namespace truebox

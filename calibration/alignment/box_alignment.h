@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "alignment/refinement.h"
+#include "alignment/rendered_view.h"
 #include "image/image.h"
 #include "radiometry/progress.h"
 #include "scene/scene.h"
@@ -69,7 +70,7 @@ struct BoxAlignment {
   double held_out_rms_px = 0.0;  ///< of those held out; NaN if none are
   double cross_validated_rms_px = 0.0;  ///< each border by a camera fitted without it
   double excess_u_px = 0.0;             ///< scatter beyond the pixels' noise: shape, lens, shading
-  std::vector<double> correlation;      ///< of residuals along an edge, lag 1, 2, ... pieces
+  EdgeErrors errors;                    ///< the same as the covariance has it, apart by kind
   double blur_px = 0.0;                 ///< median over the edges
   int reduction = 1;                    ///< pixels averaged each way before edges were sought
 };
@@ -79,12 +80,20 @@ struct BoxAlignment {
 /// poses on a reduced picture, closest edges of like direction on finer ones (Cauchy's loss), then
 /// steps fitted to the pixels across every predicted piece of edge. All px are the photograph's.
 ///
-/// The covariance takes the scatter of the residuals for granted (never less than the pixels'
-/// noise) and their correlation along edges, and holds no bound. A common error of all edges is not
+/// The covariance takes the pixels' noise and what the residuals tell of further errors, each
+/// piece's own and waves along an edge (`edge_error_posterior`). A common error of all edges is not
 /// in it: a wrong scene, a lens of another kind, a tone curve other than the photograph says.
 ///
 /// Throws MismatchError where the photograph has another shape than the camera's film.
 BoxAlignment align_box(const Scene& scene, const CameraDescription& guess, const Image& photograph,
                        const AlignmentOptions& options);
+
+/// The same for a rendered picture in place of a scene: its own edges, those of shadows too, where
+/// its AOVs say that they are; the guess is its camera. Of a print (see RenderedView) the camera
+/// found stands for a registration of the whole picture. Lines that the render's polygons do not
+/// have cannot be stretched: `stretch_u` has to be 0.
+/// Throws MismatchError as above, except for a print, which may have another shape.
+BoxAlignment align_picture(const RenderedView& view, const Image& photograph,
+                           const AlignmentOptions& options);
 
 }  // namespace truebox

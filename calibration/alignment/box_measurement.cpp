@@ -39,6 +39,7 @@ Observations observations_of(const std::vector<EdgeMatch>& matches,
   for (const EdgeMatch& m : matches) {
     if (m.use != EdgeUse::used) continue;
     observations.edges.push_back(m.seen);
+    observations.edges.back().noise_u_px = m.seen.u_px;
     observations.edges.back().u_px = std::hypot(m.seen.u_px, excess_px);
   }
   return observations;
@@ -81,7 +82,7 @@ std::vector<EdgeMatch> BoxAligner::measure(const CameraParameters& p, const Edge
   std::vector<double> blurs;
   for (const EdgeSample& s : predicted) {
     EdgeMatch match;
-    match.border = edges_.border_name(s);
+    match.border = edges_->border_name(s);
     match.predicted = s.position;
     match.seen = {s.edge, s.point_m, s.position, s.normal, 1.0};
     double shift = 0.0;
@@ -141,11 +142,7 @@ bool BoxAligner::refine_to_pixels(CameraParameters& p, BoxAlignment& result) {
 
 void BoxAligner::state_uncertainty(BoxAlignment& result) const {
   const Observations seen = observations_of(result.matches, options_.points, result.excess_u_px);
-  std::vector<double> standardised = edge_residuals_px(result.parameters, seen.edges);
-  for (std::size_t i = 0; i < standardised.size(); ++i) standardised[i] /= seen.edges[i].u_px;
-  result.correlation = correlation_along_edges(seen.edges, standardised);
-  const ParameterCovariance c =
-      parameter_covariance(result.parameters, seen, full_, result.correlation);
+  const ParameterCovariance c = parameter_covariance(result.parameters, seen, full_);
   result.outcome = c.outcome;
   result.null_direction = c.null_direction;
   if (c.outcome != AlignmentOutcome::converged) {
@@ -153,11 +150,8 @@ void BoxAligner::state_uncertainty(BoxAlignment& result) const {
     return;
   }
   result.covariance = c.covariance;
-  const auto& p = result.parameters;
-  std::vector<double> values(p.pose.begin(), p.pose.end());
-  values.insert(values.end(), p.intrinsics.begin(), p.intrinsics.end());
-  values.insert(values.end(), p.distortion.begin(), p.distortion.end());
-  values.insert(values.end(), p.stretch.begin(), p.stretch.end());
+  result.errors = c.errors;
+  const auto values = values_of(result.parameters);
   Eigen::Index k = 0;
   for (const std::size_t i : full_.indices()) {
     result.estimated.push_back({parameter_names()[i], parameter_units()[i], values[i],

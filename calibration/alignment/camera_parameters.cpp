@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "alignment/camera_parameters.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "alignment/projection.h"
@@ -64,6 +65,15 @@ const std::array<std::string, kCameraParameters>& parameter_units() {
       "rad", "rad", "rad", "m", "m", "m", "px", "px", "px", "1", "1", "1",
       "1",   "1",   "1",   "1", "1", "1", "1",  "1",  "1",  "1", "1", "1"};
   return kUnits;
+}
+
+std::array<double, kCameraParameters> values_of(const CameraParameters& p) {
+  std::array<double, kCameraParameters> values{};
+  auto next = std::copy(p.pose.begin(), p.pose.end(), values.begin());
+  next = std::copy(p.intrinsics.begin(), p.intrinsics.end(), next);
+  next = std::copy(p.distortion.begin(), p.distortion.end(), next);
+  std::copy(p.stretch.begin(), p.stretch.end(), next);
+  return values;
 }
 
 CameraParameters camera_parameters(const CameraDescription& camera, const Vec3& centre_m) {

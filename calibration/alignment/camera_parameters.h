@@ -34,6 +34,9 @@ const std::array<std::string, kCameraParameters>& parameter_names();
 /// rad, m, px, 1.
 const std::array<std::string, kCameraParameters>& parameter_units();
 
+/// All of them, in the order of their names.
+std::array<double, kCameraParameters> values_of(const CameraParameters& parameters);
+
 CameraParameters camera_parameters(const CameraDescription& camera, const Vec3& centre_m);
 
 /// The same camera as a scene file describes it; film, pixels and all that is not geometry from

@@ -153,6 +153,12 @@ void EdgeField::spread(std::vector<int>& nearest) const {
   }
 }
 
+std::vector<EdgeField::Ridge> EdgeField::ridges() const {
+  std::vector<Ridge> ridges;
+  for (const Point& p : points_) ridges.push_back({{scale_ * p.x, scale_ * p.y}, p.angle});
+  return ridges;
+}
+
 std::optional<EdgeField::Found> EdgeField::nearest(PixelPosition position,
                                                    const std::array<double, 2>& normal) const {
   const double x = position.x_px / scale_, y = position.y_px / scale_;

@@ -27,6 +27,12 @@ class EdgeField {
   /// The nearest edge whose direction agrees with the line's to 11 to 34 degrees.
   std::optional<Found> nearest(PixelPosition position, const std::array<double, 2>& normal) const;
 
+  /// A point of an edge: px of the file, and the gradient's direction in [0, pi).
+  struct Ridge {
+    PixelPosition position;
+    double angle_rad = 0.0;
+  };
+  std::vector<Ridge> ridges() const;
   std::size_t edge_count() const { return points_.size(); }
   double scale() const { return scale_; }
   int width() const { return width_; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 
 namespace truebox {
 namespace {
@@ -18,16 +19,9 @@ double white_of(const Image& image) {
   return value > 0.0 ? value : 1.0;
 }
 
-std::vector<float> light(const Image& image, const Channel& channel, bool coded, double white) {
-  std::vector<float> plane(channel.samples.size());
-  for (std::size_t i = 0; i < plane.size(); ++i) {
-    const double v = channel.samples[i];
-    plane[i] = !std::isfinite(v) ? 0.0f
-               : coded           ? static_cast<float>(srgb_to_linear(v / white))
-                                 : static_cast<float>(v);
-  }
-  plane.resize(image.pixel_count());
-  return plane;
+bool is_coded(const Image& image) {
+  const auto transfer = image.attributes.find("transfer");
+  return transfer != image.attributes.end() && transfer->second == "sRGB";
 }
 
 void scale_to_one(std::vector<std::vector<float>>& planes) {
@@ -43,6 +37,26 @@ void scale_to_one(std::vector<std::vector<float>>& planes) {
 }
 
 }  // namespace
+
+std::vector<float> linear_light(const Image& image, const Channel& channel) {
+  const bool coded = is_coded(image);
+  const double white = white_of(image);
+  std::vector<float> plane(channel.samples.size());
+  for (std::size_t i = 0; i < plane.size(); ++i) {
+    const double v = channel.samples[i];
+    plane[i] = !std::isfinite(v) ? 0.0f
+               : coded           ? static_cast<float>(srgb_to_linear(v / white))
+                                 : static_cast<float>(v);
+  }
+  plane.resize(image.pixel_count());
+  return plane;
+}
+
+double saturation_of(const Image& image) {
+  const auto white = image.attributes.find("white_dn");
+  return white == image.attributes.end() ? std::numeric_limits<double>::infinity()
+                                         : std::atof(white->second.c_str());
+}
 
 std::vector<float> reduced(const std::vector<float>& plane, int width, int height, int n) {
   if (n == 1) return plane;
@@ -67,19 +81,15 @@ EdgePlanes edge_planes(const Image& photograph, int most_px) {
     ++planes.reduction;
   planes.width = photograph.width / planes.reduction;
   planes.height = photograph.height / planes.reduction;
-  const auto transfer = photograph.attributes.find("transfer");
-  const bool coded = transfer != photograph.attributes.end() && transfer->second == "sRGB";
-  const double white = white_of(photograph);
   const auto add = [&](const std::vector<float>& plane) {
     planes.linear.push_back(reduced(plane, photograph.width, photograph.height, planes.reduction));
   };
   if (photograph.find("R") && photograph.find("G") && photograph.find("B")) {
-    for (const char* name : {"R", "G", "B"})
-      add(light(photograph, *photograph.find(name), coded, white));
+    for (const char* name : {"R", "G", "B"}) add(linear_light(photograph, *photograph.find(name)));
   } else {
     std::vector<float> mean(photograph.pixel_count(), 0.0f);
     for (const Channel& channel : photograph.channels) {
-      const auto plane = light(photograph, channel, coded, white);
+      const auto plane = linear_light(photograph, channel);
       for (std::size_t i = 0; i < mean.size(); ++i)
         mean[i] += plane[i] / static_cast<float>(photograph.channels.size());
     }

@@ -29,6 +29,14 @@ struct EdgePlanes {
 /// of all. What is not finite counts as dark. Reduced until no side exceeds `most_px`.
 EdgePlanes edge_planes(const Image& photograph, int most_px);
 
+/// A channel in proportion to light: decoded if attribute "transfer" says sRGB. What is not finite
+/// counts as dark.
+std::vector<float> linear_light(const Image& image, const Channel& channel);
+
+/// The reading at which a picture of whole digital numbers clips (attribute "white_dn"); infinite
+/// where there is no such.
+double saturation_of(const Image& image);
+
 /// Averages n x n pixels; what is left over at the right and bottom is dropped.
 std::vector<float> reduced(const std::vector<float>& plane, int width, int height, int n);
 

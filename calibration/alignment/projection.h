@@ -9,6 +9,31 @@
 
 namespace truebox {
 
+constexpr int kPose = 6, kIntrinsics = 3, kDistortion = 12, kStretch = 3;
+
+/// A part of the parameters that an optimiser holds as one: where, and which of all it begins with.
+struct Block {
+  double* values;
+  int first, size;
+};
+
+inline std::array<Block, 4> blocks_of(CameraParameters& p) {
+  return {Block{p.pose.data(), 0, kPose}, Block{p.intrinsics.data(), kPose, kIntrinsics},
+          Block{p.distortion.data(), kPose + kIntrinsics, kDistortion},
+          Block{p.stretch.data(), kPose + kIntrinsics + kDistortion, kStretch}};
+}
+
+/// What does not change while parameters do.
+struct Frame {
+  Eigen::Matrix3d rotation;
+  double aspect;
+  Vec3 offset_m;
+};
+
+inline Frame frame_of(const CameraParameters& p, const Vec3& point_m) {
+  return {p.rotation, p.aspect, point_m - p.centre_m};
+}
+
 /// exp(w) x, w a rotation vector (Rodrigues); to first order where the angle vanishes, so that its
 /// derivative is exact there.
 template <class T>

@@ -4,7 +4,6 @@
 #include <ceres/ceres.h>
 #include <ceres/normal_prior.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -13,15 +12,6 @@
 
 namespace truebox {
 namespace {
-
-constexpr int kPose = 6, kIntrinsics = 3, kDistortion = 12, kStretch = 3;
-
-/// What does not change while parameters do.
-struct Frame {
-  Eigen::Matrix3d rotation;
-  double aspect;
-  Vec3 offset_m;
-};
 
 template <class T>
 bool across_edge(const Frame& frame, const EdgeObservation& seen, const T* const* p, T* residual) {
@@ -63,17 +53,6 @@ struct PointCost {
     return from_point(frame, seen, p, residual);
   }
 };
-
-struct Block {
-  double* values;
-  int first, size;
-};
-
-std::array<Block, 4> blocks_of(CameraParameters& p) {
-  return {Block{p.pose.data(), 0, kPose}, Block{p.intrinsics.data(), kPose, kIntrinsics},
-          Block{p.distortion.data(), kPose + kIntrinsics, kDistortion},
-          Block{p.stretch.data(), kPose + kIntrinsics + kDistortion, kStretch}};
-}
 
 void add_blocks(ceres::Problem& problem, CameraParameters& p, const ParameterFreedom& freedom) {
   for (const Block& block : blocks_of(p)) {
@@ -150,69 +129,128 @@ std::vector<double> edge_residuals_px(const CameraParameters& parameters,
   return residuals;
 }
 
+namespace {
+
+using Jet = ceres::Jet<double, static_cast<int>(kCameraParameters)>;
+
+/// Derivatives of residuals by the free parameters, at one place.
+class Derivatives {
+ public:
+  Derivatives(const CameraParameters& at, const ParameterFreedom& freedom)
+      : at_(at), free_(freedom.indices()) {
+    CameraParameters copy = at;
+    for (const Block& block : blocks_of(copy))
+      for (int k = 0; k < block.size; ++k)
+        jets_[static_cast<std::size_t>(block.first + k)] = Jet(block.values[k], block.first + k);
+  }
+
+  Eigen::Index count() const { return static_cast<Eigen::Index>(free_.size()); }
+  const std::vector<std::size_t>& free() const { return free_; }
+
+  /// Of one row; zero behind the camera.
+  Eigen::RowVectorXd edge(const EdgeObservation& seen, double* value) const {
+    EdgeObservation unweighted = seen;
+    unweighted.u_px = 1.0;
+    Jet residual;
+    if (!across_edge(frame(seen.point_m), unweighted, blocks().data(), &residual))
+      residual = Jet(0.0);
+    *value = residual.a;
+    return row(residual);
+  }
+
+  /// Of both coordinates over u; false behind the camera.
+  bool point(const PointObservation& seen, Eigen::MatrixXd* rows, Eigen::Vector2d* values) const {
+    Jet residual[2];
+    if (!from_point(frame(seen.point_m), seen, blocks().data(), residual)) return false;
+    rows->resize(2, count());
+    for (Eigen::Index k = 0; k < 2; ++k) {
+      rows->row(k) = row(residual[k]);
+      (*values)[k] = residual[k].a;
+    }
+    return true;
+  }
+
+ private:
+  std::array<const Jet*, 4> blocks() const {
+    return {jets_.data(), jets_.data() + kPose, jets_.data() + kPose + kIntrinsics,
+            jets_.data() + kPose + kIntrinsics + kDistortion};
+  }
+  Frame frame(const Vec3& point) const { return {at_.rotation, at_.aspect, point - at_.centre_m}; }
+  Eigen::RowVectorXd row(const Jet& residual) const {
+    Eigen::RowVectorXd j(count());
+    for (Eigen::Index k = 0; k < count(); ++k)
+      j[k] = residual.v[static_cast<Eigen::Index>(free_[static_cast<std::size_t>(k)])];
+    return j;
+  }
+
+  const CameraParameters& at_;
+  std::vector<std::size_t> free_;
+  std::array<Jet, kCameraParameters> jets_;
+};
+
+EdgeChain chain_of(const Derivatives& derivatives, const EdgeObservation* first,
+                   std::size_t count) {
+  EdgeChain chain;
+  const auto n = static_cast<Eigen::Index>(count);
+  chain.rows.resize(n, derivatives.count());
+  for (Eigen::VectorXd* v : {&chain.residual_px, &chain.noise_u_px, &chain.u_px, &chain.gap_px})
+    v->setZero(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const EdgeObservation& seen = first[i];
+    chain.rows.row(i) = derivatives.edge(seen, &chain.residual_px[i]);
+    chain.noise_u_px[i] = seen.noise_u_px;
+    chain.u_px[i] = seen.u_px;
+    if (i > 0)
+      chain.gap_px[i] = std::hypot(seen.position.x_px - first[i - 1].position.x_px,
+                                   seen.position.y_px - first[i - 1].position.y_px);
+  }
+  return chain;
+}
+
+/// The fit near `parameters`; information and pull of priors and points.
+LinearisedFit linearised(const CameraParameters& parameters, const Derivatives& derivatives,
+                         const Observations& observations, const ParameterFreedom& freedom) {
+  LinearisedFit fit;
+  const Eigen::Index n = derivatives.count();
+  fit.information = Eigen::MatrixXd::Zero(n, n);
+  fit.pull = Eigen::VectorXd::Zero(n);
+  const auto values = values_of(parameters);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const std::size_t i = derivatives.free()[static_cast<std::size_t>(k)];
+    if (!std::isfinite(freedom.prior_u[i])) continue;
+    fit.information(k, k) = std::pow(freedom.prior_u[i], -2.0);
+    fit.pull[k] = fit.information(k, k) * (values[i] - freedom.prior_value[i]);
+  }
+  Eigen::MatrixXd rows;
+  Eigen::Vector2d residual;
+  for (const PointObservation& seen : observations.points) {
+    if (!derivatives.point(seen, &rows, &residual)) continue;
+    fit.information += rows.transpose() * rows;
+    fit.pull += rows.transpose() * residual;
+  }
+  const auto& edges = observations.edges;
+  for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
+    while (last < edges.size() && edges[last].edge == edges[first].edge) ++last;
+    fit.edges.push_back(chain_of(derivatives, &edges[first], last - first));
+  }
+  return fit;
+}
+
+}  // namespace
+
 ParameterCovariance parameter_covariance(const CameraParameters& parameters,
                                          const Observations& observations,
-                                         const ParameterFreedom& freedom,
-                                         const std::vector<double>& along_edge) {
-  using Jet = ceres::Jet<double, static_cast<int>(kCameraParameters)>;
-  CameraParameters at = parameters;
-  std::array<Jet, kCameraParameters> jets;
-  for (const Block& block : blocks_of(at))
-    for (int k = 0; k < block.size; ++k)
-      jets[static_cast<std::size_t>(block.first + k)] = Jet(block.values[k], block.first + k);
-  const Jet* const p[] = {jets.data(), jets.data() + kPose, jets.data() + kPose + kIntrinsics,
-                          jets.data() + kPose + kIntrinsics + kDistortion};
-  const auto free = freedom.indices();
-  const auto n = static_cast<Eigen::Index>(free.size());
-  const auto row = [&](const Jet& residual) {
-    Eigen::VectorXd j(n);
-    for (Eigen::Index k = 0; k < n; ++k)
-      j[k] = residual.v[static_cast<Eigen::Index>(free[static_cast<std::size_t>(k)])];
-    return j;
-  };
-  const auto frame = [&](const Vec3& point) {
-    return Frame{parameters.rotation, parameters.aspect, point - parameters.centre_m};
-  };
-  Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(n, n), curvature = prior, scatter = prior;
+                                         const ParameterFreedom& freedom) {
+  const Derivatives derivatives(parameters, freedom);
+  const LinearisedFit fit = linearised(parameters, derivatives, observations, freedom);
+  Eigen::MatrixXd curvature = fit.information;
+  for (const EdgeChain& chain : fit.edges) {
+    const Eigen::MatrixXd weighted = chain.u_px.cwiseInverse().asDiagonal() * chain.rows;
+    curvature += weighted.transpose() * weighted;
+  }
   std::vector<std::string> names;
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const std::size_t i = free[static_cast<std::size_t>(k)];
-    names.push_back(parameter_names()[i]);
-    if (std::isfinite(freedom.prior_u[i])) prior(k, k) = std::pow(freedom.prior_u[i], -2.0);
-  }
-  std::vector<Eigen::VectorXd> rows;
-  for (const EdgeObservation& seen : observations.edges) {
-    Jet residual;
-    rows.push_back(across_edge(frame(seen.point_m), seen, p, &residual) ? row(residual)
-                                                                        : Eigen::VectorXd::Zero(n));
-  }
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    curvature += rows[i] * rows[i].transpose();
-    for (std::size_t lag = 1; lag <= along_edge.size() && i + lag < rows.size(); ++lag) {
-      if (observations.edges[i].edge != observations.edges[i + lag].edge) break;
-      const double weight = along_edge[lag - 1];
-      const Eigen::MatrixXd cross = rows[i] * rows[i + lag].transpose();
-      scatter += weight * (cross + cross.transpose());
-    }
-  }
-  scatter += curvature;
-  for (const PointObservation& seen : observations.points) {
-    Jet residual[2];
-    if (!from_point(frame(seen.point_m), seen, p, residual)) continue;
-    for (const Jet& r : residual) {
-      const Eigen::VectorXd j = row(r);
-      curvature += j * j.transpose();
-      scatter += j * j.transpose();
-    }
-  }
-  // Correlations cut off at some lag may be those of no process: what is known least is then taken
-  // as independent rather than as better than that.
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scatter);
-  if (n > 0 && eigen.eigenvalues()[0] < -1e-9 * eigen.eigenvalues()[n - 1])
-    scatter = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
-                  eigen.eigenvectors().transpose() +
-              curvature;
-  const NormalInverse inverse = invert_normal_matrix(curvature + prior, names);
+  for (const std::size_t i : derivatives.free()) names.push_back(parameter_names()[i]);
+  const NormalInverse inverse = invert_normal_matrix(curvature, names);
   ParameterCovariance result;
   result.condition = inverse.condition;
   if (!inverse.inverse) {
@@ -220,30 +258,14 @@ ParameterCovariance parameter_covariance(const CameraParameters& parameters,
     result.null_direction = inverse.weakest;
     return result;
   }
+  const auto posterior = edge_error_posterior(fit);
+  result.errors = mean_errors(posterior);
+  Eigen::MatrixXd scatter = fit.information;
+  for (const auto& [errors, probability] : posterior)
+    scatter += probability * edge_scatter(fit, errors);
+  result.covariance = *inverse.inverse * scatter * *inverse.inverse;
   result.outcome = AlignmentOutcome::converged;
-  result.covariance = *inverse.inverse * (scatter + prior) * *inverse.inverse;
   return result;
-}
-
-std::vector<double> correlation_along_edges(const std::vector<EdgeObservation>& edges,
-                                            const std::vector<double>& standardised) {
-  constexpr std::size_t kMostLags = 40;
-  double variance = 0.0;
-  for (double r : standardised) variance += r * r / static_cast<double>(standardised.size());
-  std::vector<double> correlations;
-  for (std::size_t lag = 1; lag <= kMostLags && variance > 0.0; ++lag) {
-    double sum = 0.0, pairs = 0.0;
-    for (std::size_t i = 0; i + lag < edges.size(); ++i) {
-      if (edges[i].edge != edges[i + lag].edge) continue;
-      sum += standardised[i] * standardised[i + lag];
-      pairs += 1.0;
-    }
-    if (pairs < 10.0) break;
-    const double rho = sum / pairs / variance;
-    if (rho < 2.0 / std::sqrt(pairs)) break;
-    correlations.push_back(rho);
-  }
-  return correlations;
 }
 
 double excess_u_px(const std::vector<double>& residuals_px, const std::vector<double>& u_px,

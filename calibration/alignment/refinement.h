@@ -8,6 +8,7 @@
 
 #include "alignment/alignment_summary.h"
 #include "alignment/camera_parameters.h"
+#include "alignment/edge_errors.h"
 
 namespace truebox {
 
@@ -17,7 +18,8 @@ struct EdgeObservation {
   Vec3 point_m = Vec3::Zero();
   PixelPosition position;
   std::array<double, 2> normal{};
-  double u_px = 1.0;
+  double u_px = 1.0;        ///< that the fit weighs it with
+  double noise_u_px = 0.0;  ///< the part of it that comes from the piece's own pixels
 };
 
 /// A point of the scene was seen at a place in the picture.
@@ -68,25 +70,20 @@ std::vector<double> edge_residuals_px(const CameraParameters& parameters,
                                       const std::vector<EdgeObservation>& edges);
 
 /// Covariance of the free parameters, in the order of freedom.indices(), at the least-squares
-/// solution. Errors of neighbouring observations of one edge have the correlations
-/// `along_edge[lag]` (lag 1 first); each observation's u is right: C = H^-1 (sum_ij rho_ij j_i
-/// j_j^T + P) H^-1, H = sum_i j_i j_i^T + P, j_i = rows over u_i, P the priors (a "sandwich": White
-/// 1980, Econometrica 48(4)).
+/// solution, C = H^-1 (J^T W S W J + P) H^-1, H = J^T W J + P: J the residuals' derivatives, W the
+/// weights u^-2 of the fit, P the priors, and S the covariance of the edges' errors, which the
+/// residuals tell (a "sandwich": White 1980, Econometrica 48(4)): the pixels' noise and
+/// `edge_error_posterior`, over which S is averaged. u only weighs; u_px of points counts as it is.
 struct ParameterCovariance {
   AlignmentOutcome outcome = AlignmentOutcome::not_run;
   std::string null_direction;
   Eigen::MatrixXd covariance;
   double condition = 0.0;
+  EdgeErrors errors;  ///< beyond the pixels' noise, mean
 };
 ParameterCovariance parameter_covariance(const CameraParameters& parameters,
                                          const Observations& observations,
-                                         const ParameterFreedom& freedom,
-                                         const std::vector<double>& along_edge);
-
-/// Correlation of neighbouring residuals along edges at lag 1, 2, ... up to the last that exceeds
-/// 2 / sqrt(n); empty if none does. Standardised residuals, pairs of one edge only.
-std::vector<double> correlation_along_edges(const std::vector<EdgeObservation>& edges,
-                                            const std::vector<double>& standardised);
+                                         const ParameterFreedom& freedom);
 
 /// Standard deviation (px) that all observations share beyond their own u, so that the mean of
 /// r^2 / (u^2 + x^2) is 1; 0 if it already is at most that. Source: Mandel, Paule (1970), Anal.

@@ -16,8 +16,8 @@ double distance_px(PixelPosition a, PixelPosition b) {
   return std::hypot(a.x_px - b.x_px, a.y_px - b.y_px);
 }
 
-// Leaves out what another edge comes close to: a window there would see two steps. Of edges that
-// coincide, the first is kept.
+}  // namespace
+
 std::vector<EdgeSample> cleared(const std::vector<EdgeSample>& samples, double clearance_px) {
   constexpr double kSame_px = 0.25;
   std::vector<EdgeSample> kept;
@@ -40,8 +40,6 @@ std::vector<EdgeSample> cleared(const std::vector<EdgeSample>& samples, double c
   }
   return kept;
 }
-
-}  // namespace
 
 SceneEdges::SceneEdges(const Scene& scene) {
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;

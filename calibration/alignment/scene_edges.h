@@ -68,6 +68,10 @@ class SceneEdges {
   Vec3 centre_m_ = Vec3::Zero();
 };
 
+/// Leaves out samples that another edge comes close to: a window there would see two steps. Of
+/// edges that coincide, the first is kept.
+std::vector<EdgeSample> cleared(const std::vector<EdgeSample>& samples, double clearance_px);
+
 /// The scene with every vertex moved by `place` (for example stretched).
 template <class Place>
 Scene with_moved_vertices(Scene scene, const Place& place) {

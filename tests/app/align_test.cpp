@@ -136,6 +136,74 @@ TEST(AlignCommand, TakesPickedPoints) {
   EXPECT_THAT(run.text, HasSubstr("[cameras.side]"));
 }
 
+std::string render_of_box(const std::string& name) {
+  const std::string path = scratch_path(name + ".exr");
+  FILE* pipe = popen(("'" TRUEBOX_PROGRAM "' render '" + kBox +
+                      "' --camera front --pixels 128 128 --elements 400 --rays 8 -o '" + path +
+                      "' --aov '" + scratch_path(name + "_aov.exr") + "' 2>&1")
+                         .c_str(),
+                     "r");
+  if (pipe) {
+    while (fgetc(pipe) != EOF) {
+    }
+    pclose(pipe);
+  }
+  return path;
+}
+
+// The contract's form: a render by this program, a picture of the same box by another one.
+TEST(AlignCommand, TakesARenderInPlaceOfAScene) {
+  const std::string photograph =
+      std::string(TRUEBOX_REFERENCE_DIR) + "/independent_renders/cornell_box_front_256_7bands.exr";
+  const std::string render = render_of_box("front"), directory = scratch_path("from_render");
+  // The render names its scene and its camera; then its light is held against the photograph's.
+  Finished run = align("'" + render + "' '" + photograph + "' --lens fixed --photometric -o '" +
+                       directory + "'");
+  ASSERT_TRUE(run.code == 0 || run.code == 1) << run.text;
+  auto json = json_of(directory + "/alignment.json");
+  EXPECT_EQ(json["aligned_to"], "render");
+  EXPECT_EQ(json["outcome"], "converged");
+  EXPECT_EQ(json["light"]["bands"].size(), 6u);  // the lamp has no light at 400 nm
+  EXPECT_EQ(json["light"]["covariance"].size(), json["light"]["parameters"].size());
+  EXPECT_LE(json["light"]["u_of_positions_with_light_px"].get<double>(),
+            json["light"]["u_of_positions_by_edges_px"].get<double>());
+  const Image mapping = read_image(directory + "/photo_from_render.exr");
+  ASSERT_EQ(mapping.width, 128);
+  // One camera, twice as many pixels.
+  EXPECT_NEAR(mapping.find("x_px")->samples[mapping.index(64, 100)], 129.0, 0.3);
+  EXPECT_NEAR(mapping.find("y_px")->samples[mapping.index(64, 100)], 201.0, 0.3);
+  EXPECT_EQ(read_image(directory + "/photograph.exr").width, 128);
+  // Its own edges, where its AOVs say that they are.
+  run = align("'" + render + "' '" + photograph + "' --lens fixed --aov '" +
+              scratch_path("front_aov.exr") + "' -o '" + directory + "'");
+  ASSERT_EQ(run.code, 0) << run.text;
+  EXPECT_EQ(json_of(directory + "/alignment.json")["aligned_to"], "render with AOVs");
+  Image grey(128, 128);
+  grey.add_channel("Y", 0.5f);
+  write_exr(scratch_path("grey.exr"), grey);
+  run = align("'" + render + "' '" + scratch_path("grey.exr") + "' -o '" + directory + "'");
+  EXPECT_EQ(run.code, 5) << run.text;
+  EXPECT_THAT(run.text, HasSubstr("does not show this box"));
+}
+
+TEST(AlignCommand, TakesAPictureOfUnknownOriginForAPrint) {
+  const std::string photograph =
+      std::string(TRUEBOX_REFERENCE_DIR) + "/independent_renders/cornell_box_front_256_7bands.exr";
+  const std::string directory = scratch_path("print");
+  Finished run = align("'" + photograph + "' '" + photograph + "' -o '" + directory + "'");
+  ASSERT_EQ(run.code, 0) << run.text;
+  EXPECT_EQ(json_of(directory + "/alignment.json")["aligned_to"], "print");
+  EXPECT_FALSE(std::filesystem::exists(directory + "/camera.toml"));  // no camera of a scene
+  const Image mapping = read_image(directory + "/photo_from_render.exr");
+  EXPECT_NEAR(mapping.find("x_px")->samples[mapping.index(200, 50)], 200.5, 0.05);
+  run = align("'" + photograph + "' '" + photograph + "' --camera front -o '" + directory + "'");
+  EXPECT_EQ(run.code, 4);
+  EXPECT_THAT(run.text, HasSubstr("--scene with --camera"));
+  run = align("'" + kBox + "' '" + photograph + "' --aov x.exr -o '" + directory + "'");
+  EXPECT_EQ(run.code, 4);
+  EXPECT_THAT(run.text, HasSubstr("a render with --aov"));
+}
+
 TEST(AlignCommand, CalibratesTheLensFromChessboards) {
   const std::string directory = scratch_path("lens");
   const Finished run = align("--chessboard 9x6 --square 25mm '" + kBoards + "01.jpg' '" + kBoards +
@@ -161,7 +229,7 @@ TEST(AlignCommand, SaysWhatIsWrong) {
   EXPECT_THAT(run.text, HasSubstr("25mm"));
   run = align("'" + kBox + "'" + out);
   EXPECT_EQ(run.code, 4);
-  EXPECT_THAT(run.text, HasSubstr("a scene file and a photograph"));
+  EXPECT_THAT(run.text, HasSubstr("a scene file or a render, and a photograph"));
   run = align("'" + kBox + "' '" + kBoards + "01.jpg' --camera front" + out);
   EXPECT_EQ(run.code, 3);  // the camera's film is square
   EXPECT_THAT(run.text, HasSubstr("another shape"));

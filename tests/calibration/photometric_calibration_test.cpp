@@ -9,6 +9,7 @@
 #include "calibration/simulated_frames.h"
 #include "image/image_file.h"
 #include "radiometry/input_error.h"
+#include "readings/chart.h"
 #include "support/dng.h"
 #include "support/scratch.h"
 
@@ -177,6 +178,117 @@ TEST(PhotometricCalibration, ScalesToALuminanceReading) {
   EXPECT_NEAR(p.common_budget.of("absolute scale"), 0.02 * p.reference_value,
               0.002 * p.reference_value);  // 5 of 250, and the region's noise
   EXPECT_THAT(budget_text(p), HasSubstr("absolute scale"));
+}
+
+/// Mean over the green photosites of a patch, its rim left out.
+double patch_mean(const LinearPhotograph& p, const MeasurementFile& file,
+                  const std::vector<std::uint8_t>& labels, const std::string& patch) {
+  const auto found = std::find(file.chart.patches.begin(), file.chart.patches.end(), patch);
+  const auto label = static_cast<std::uint8_t>(found - file.chart.patches.begin() + 1);
+  double sum = 0.0, n = 0.0;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    const int x = static_cast<int>(i) % p.width, y = static_cast<int>(i) / p.width;
+    if (labels[i] != label || p.flags[i] != 0 || file.instrument.bayer.site(x, y) != 'G') continue;
+    sum += p.value[i];
+    n += 1.0;
+  }
+  return sum / n;
+}
+
+// The real chart: someone read one of its greys with a luminance meter.
+TEST(PhotometricCalibration, ScalesToAReadingOfOnePatch) {
+  MeasurementFile file =
+      read_measurement(std::string(TRUEBOX_REFERENCE_DIR) + "/llanos_narrowband/measurement.toml");
+  std::erase_if(file.bands, [](const BandFiles& b) { return b.name != "550 nm"; });
+  ASSERT_EQ(file.bands.size(), 1u);
+  const LinearPhotograph plain = calibrate_photographs(file).photographs.at(0);
+  file.scales = {{"", {}, "neutral_5", {80.0, 2.0}, "cd m^-2"}};
+  const LinearPhotograph scaled = calibrate_photographs(file).photographs.at(0);
+  const auto labels = eroded_labels(
+      read_chart(file.chart.labels_path, file.chart.reflectance_path, file.chart.patches),
+      file.chart.margin_px);
+  EXPECT_EQ(scaled.unit, "cd m^-2");
+  EXPECT_NEAR(patch_mean(scaled, file, labels, "neutral_5"), 80.0, 1e-3);  // floats in the file
+  // Nothing but the unit changes: ratios stay.
+  EXPECT_NEAR(
+      patch_mean(scaled, file, labels, "white_9.5") / 80.0,
+      patch_mean(plain, file, labels, "white_9.5") / patch_mean(plain, file, labels, "neutral_5"),
+      1e-5);
+  // 2.5 %, common to all photosites, and the noise of the patch's mean.
+  const double relative = scaled.common_budget.of("absolute scale") / scaled.reference_value;
+  EXPECT_GE(relative, 0.025);
+  EXPECT_LT(relative, 0.026);
+  for (std::size_t i = 0; i < scaled.value.size(); i += 97)
+    if (scaled.flags[i] == 0) {
+      EXPECT_GE(scaled.u_common[i], 0.0249 * scaled.value[i]);
+    }
+}
+
+TEST(PhotometricCalibration, RefusesToScaleByAPatchThatTheChartDoesNotHave) {
+  const std::string path = measurement(
+      "no_patch.toml", kInstrument,
+      "[[scale]]\npatch = \"grey\"\nvalue = 1\nuncertainty = 0.1\nunit = \"cd m^-2\"\n");
+  try {
+    read_measurement(path);
+    FAIL() << "a patch without a chart";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("the name of a chart patch"));
+  }
+}
+
+/// Each photosite its own dark current, electrons a second; one in a hundred is warm.
+std::vector<double> dark_currents(std::size_t count) {
+  std::mt19937_64 random(31);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  std::vector<double> currents;
+  for (std::size_t i = 0; i < count; ++i)
+    currents.push_back(uniform(random) < 0.01 ? 40.0 : 4.0 * uniform(random));
+  return currents;
+}
+
+// Darks were taken at 1 s and 4 s, the photograph at 2.5 s: between them, photosite by photosite.
+TEST(PhotometricCalibration, TakesTheDarkOfAnExposureBetweenTwo) {
+  constexpr int kSide = 64;
+  const std::vector<double> current = dark_currents(kSide * kSide);
+  std::vector<double> scene = textured_scene(kSide, kSide, 500.0, 32), seen;
+  for (std::size_t i = 0; i < scene.size(); ++i) seen.push_back(scene[i] + current[i]);
+  const SimulatedSensor sensor{
+      .gain_dn = kGain_dn, .read_noise_dn = kReadNoise_dn, .black_dn = kBlack_dn, .top_dn = 4095.0};
+  std::mt19937_64 random(33);
+  std::string darks;
+  for (const auto& [t, label] :
+       std::vector<std::pair<double, std::string>>{{1.0, "1"}, {4.0, "4"}}) {
+    std::vector<std::string> names;
+    for (int k = 0; k < 6; ++k)
+      names.push_back(save("between_" + label + "_" + std::to_string(k) + ".tif",
+                           simulated_frame(current, kSide, t, sensor, random)));
+    darks += "[[dark]]\nexposure_s = " + label + "\nfiles = " + files_text(names);
+  }
+  save("between.tif", simulated_frame(seen, kSide, 2.5, sensor, random));
+  const std::string instrument =
+      "bits = 12\nbayer = \"none\"\nsaturation_dn = 4000\nresponse = \"linear\"\ngain = 0.25\n"
+      "read_noise = 1.2\n";
+  const auto photographed_for = [&](const std::string& exposure) {
+    return "[[bands]]\nname = \"b\"\nphotographs = [{ file = \"between.tif\", exposure_s = " +
+           exposure + " }]\n";
+  };
+  const auto calibration = calibrate_photographs(
+      read_measurement(measurement("between.toml", instrument, darks + photographed_for("2.5"))));
+  const LinearPhotograph& p = calibration.photographs[0];
+  double z2 = 0.0, bias = 0.0, n = 0.0;
+  for (std::size_t i = 0; i < p.value.size(); ++i) {
+    if (p.flags[i] != 0) continue;
+    const double off = p.value[i] - kGain_dn * scene[i];
+    z2 += std::pow(off / std::hypot(p.u_noise[i], p.u_common[i]), 2);
+    bias += off;
+    n += 1.0;
+  }
+  // chi^2 over 4000 photosites: 1 +- 0.022; the mean of the errors is known to 0.04 DN s^-1.
+  EXPECT_NEAR(z2 / n, 1.0, 0.09);
+  EXPECT_NEAR(bias / n, 0.0, 0.15);
+  EXPECT_THROW(calibrate_photographs(read_measurement(
+                   measurement("beyond.toml", instrument, darks + photographed_for("5")))),
+               MismatchError);
 }
 
 std::string one_frame(const std::string& name, const std::vector<float>& samples, int width,
