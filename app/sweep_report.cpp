@@ -14,9 +14,10 @@
 namespace truebox::app {
 namespace {
 
-// A bound of two standard errors, and the reference's own two, hold for 95 % of normal answers.
-constexpr double kHeldWanted = 0.95;
-constexpr double kHeldExpected = 0.99;
+// Two standard errors of the reference hold for 95 % of normal answers where nothing else is wrong;
+// the bands of one place share their noise, so of a dozen places the share itself is good to 6 %.
+constexpr double kHeldExpected = 0.95;
+constexpr double kHeldWanted = 0.90;
 constexpr double kClearReference = 0.5;
 
 std::string held_text(const SweepPoint& p) {
