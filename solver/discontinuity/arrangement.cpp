@@ -10,6 +10,7 @@
 #include <memory>
 #include <numbers>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 namespace truebox {
