@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
+#include <stdexcept>
 
 #include "plan_settings.h"
 #include "radiometry/input_error.h"
@@ -21,6 +22,12 @@ namespace truebox::app {
 namespace {
 // Of a target error, unless --elements says where to start: its bound foretells the rest.
 constexpr std::size_t kFirstElements = 1000;
+
+// Of the finest of three grids, cut in four twice from a sixteenth of them, as Prediction does.
+std::size_t finest_elements(const Scene& scene, std::size_t asked_for) {
+  const double edge_m = edge_for_count(scene, std::max<std::size_t>(1, asked_for / 16));
+  return uniform_mesh(scene, edge_m, 2).size();
+}
 
 Goal goal_of(const PredictionArguments& a, const Scene& scene) {
   try {
@@ -159,9 +166,18 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
   options.form_factors.memory_limit_bytes = a.memory_MiB << 20;
   if (a.form_factors == "hierarchical") {
     const HierarchyOptions hierarchy{a.link_tolerance, a.memory_MiB << 20};
-    require_memory(a.elements, hierarchy);
+    const std::size_t finest = finest_elements(predicted->scene, a.elements);
+    try {
+      require_memory(finest, hierarchy);
+    } catch (const std::length_error& error) {
+      throw std::length_error(fmt::format(
+          "{}; of them --elements {} asked for {:.0f} %, the rest are what small surfaces need",
+          error.what(), a.elements,
+          100.0 * static_cast<double>(a.elements) / static_cast<double>(finest)));
+    }
     if (options.progress)
-      fmt::print(stderr, "memory: about {} MiB\n", estimated_bytes(a.elements, hierarchy) >> 20);
+      fmt::print(stderr, "memory: about {} MiB for {} elements\n",
+                 estimated_bytes(finest, hierarchy) >> 20, finest);
     options.find_exchange = hierarchical_exchange(hierarchy);
   }
   options.solve.method = method_of_name(a.method);

@@ -213,7 +213,7 @@ std::vector<LinkGrowth> print_links(const truebox::Scene& closed_box) {
     std::fflush(stdout);
     rows.push_back(r);
   };
-  constexpr std::size_t kLargestMatrix = 6000;
+  constexpr std::size_t kLargestMatrix = 11000;
   for (double tolerance : {1e-2, 3e-3})
     for (std::size_t count : {600u, 1200u, 2400u, 5000u, 10000u, 20000u})
       add(measure_links("closed box", closed_box, count, tolerance, count < kLargestMatrix));
