@@ -84,6 +84,7 @@ TEST(ErrorShares, OfABlockedCubeKnowOfItsRays) {
   scene.materials.push_back({"lamp", Reflectance(1, 0.7), RadiantExitance(1, 1.0)});
   scene.surfaces[1].material = 1;
   PredictOptions few, many;
+  few.form_factors.method = many.form_factors.method = FormFactorMethod::ray_casting;
   few.elements = many.elements = 800;
   few.error_shares = many.error_shares = true;
   few.form_factors.rays = 4;
