@@ -206,7 +206,7 @@ class Planner {
               "do not follow them"
             : "edges where surfaces meet leave every degree of first order on even elements; "
               "means, which are bound here, converge twice as fast";
-    d.left_out = "polynomials of degree 1 to 4 (in the library, without occlusion)";
+    d.left_out = "polynomials of degree 1 to 4 (solve --basis, where nothing is hidden)";
     d.error_kind = ErrorKind::bound;
     d.error = plan_.pilot ? mesh_error_ : std::numeric_limits<double>::quiet_NaN();
     d.error_of = "mean irradiance of a surface, together with the mesh";
