@@ -182,9 +182,9 @@ void print_light(const PhotometricRefinement& light) {
   if (light.bands.empty()) return;
   fmt::print(
       "  {} pixels, {} squares of {} px, dispersion {:.3g}; moved {:.3g} px; positions known to "
-      "{:.2g} px, by edges alone {:.2g} px\n",
+      "{:.2g} px, by edges alone {:.2g} px; edges met within {:.3g} px rms, before {:.3g} px\n",
       light.samples, light.blocks, light.block_px, light.dispersion, light.moved_px,
-      light.refined_u_px, light.edge_u_px);
+      light.refined_u_px, light.edge_u_px, light.edge_rms_after_px, light.edge_rms_before_px);
   if (light.outcome != AlignmentOutcome::converged) return;
   for (const EstimatedParameter& p : light.estimated)
     fmt::print("  {:<18} {:>13.6g} +- {:<10.2g} {}\n", p.name, p.value, p.standard_uncertainty,

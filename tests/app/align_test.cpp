@@ -133,7 +133,7 @@ TEST(AlignCommand, TakesPickedPoints) {
   EXPECT_THAT(run.text, HasSubstr("u_px above 0"));
   run = align("'" + kBox + "' '" + photograph + "' --camera side");
   EXPECT_EQ(run.code, 4);
-  EXPECT_THAT(run.text, HasSubstr("[cameras.side]"));
+  EXPECT_THAT(run.text, HasSubstr("one of the cameras: front"));
 }
 
 std::string render_of_box(const std::string& name) {
