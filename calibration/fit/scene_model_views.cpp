@@ -101,7 +101,10 @@ ViewPart SceneModel::part_of(const PixelBlock& pixels, Gather::Scratch& scratch)
     part.direct[l] = mean_over_block(pixels, light.col(l)).value;
   const SampledMean all = mean_over_block(pixels, light.rowwise().sum());
   part.sampling_u = all.value > 0.0 ? all.standard_uncertainty / all.value : 0.0;
-  if (pixels.weights.empty()) {
+  if (pixels.weights.empty() && options_.tile_px == 0) {
+    // Nothing moves: the element's own plane, which jumps between elements and is the more exact.
+    part.weights = plane_weights(finder_->find_patch(pixels.piece, pixels.centre), pixels.centre);
+  } else if (pixels.weights.empty()) {
     part.weights = field_weights(pixels.piece, pixels.centre);
   } else {
     for (std::size_t k = 0; k < pixels.points.size(); ++k)

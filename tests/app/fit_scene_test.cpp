@@ -74,7 +74,7 @@ TEST(FitSceneProgram, ExitsWithFiveAndNamesTheNullDirection) {
 }
 
 TEST(FitSceneProgram, EndsCleanlyAtCtrlCDuringFormFactors) {
-  // So many elements that form factors take far longer than the two seconds until SIGINT.
+  // So many elements that form factors take far longer than the three seconds until SIGINT.
   std::string path = measurement("");
   std::ifstream file(path);
   std::string text{std::istreambuf_iterator<char>(file), {}};
@@ -82,7 +82,7 @@ TEST(FitSceneProgram, EndsCleanlyAtCtrlCDuringFormFactors) {
   write_file_atomically(path, text);
   const std::string json = scratch_path("stopped.json"), directory = scratch_path("stopped");
   const CommandOutcome result =
-      run_command("timeout --preserve-status -s INT 2 '" TRUEBOX_PROGRAM "' fit " + path + " -o " +
+      run_command("timeout --preserve-status -s INT 3 '" TRUEBOX_PROGRAM "' fit " + path + " -o " +
                   json + " --report " + directory);
   EXPECT_EQ(result.code, 5) << result.text;
   EXPECT_THAT(result.text, HasSubstr("stopped by the user before there was a fit"));
