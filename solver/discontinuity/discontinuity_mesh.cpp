@@ -189,8 +189,9 @@ std::size_t count_of(const std::vector<std::vector<Polygon>>& cells) {
 
 namespace {
 
-// Every pair of a piece and a luminaire looks at every blocker: minutes, beyond that.
-constexpr std::size_t kMostLooks = 1000000000;
+// Every pair of a piece and a luminaire looks at every blocker, and every line they have in
+// common does so a hundred times: minutes, beyond that.
+constexpr std::size_t kMostLooks = 2000000;
 
 void require_few_pairs(const PatchMesh& pieces, const Scene& scene) {
   std::size_t lamps = 0;
