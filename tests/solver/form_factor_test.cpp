@@ -166,6 +166,21 @@ TEST(ExchangeArea, LosesTwoGapsBetweenNearlyTouchingPlates) {
   EXPECT_NEAR(sides, 2.0 * kGap, 1e-4 * kGap) << "each wall, d tall, sends half its light down";
 }
 
+TEST(ExchangeArea, HoldsABillionthAtTheExtremes) {
+  // mpmath, double contour with 45 to 60 digits: also rows of reference/analytic/view_factors.csv.
+  const Polygon unit = square(1.0, Vec3::Zero(), kX, kY);
+  const Polygon sliver = {{0, 0, 0}, {1, 0, 0}, {0.5, 1e-4, 0}};
+  const double sliver_area = 0.5e-4;
+  EXPECT_NEAR(exchange_of(unit, square(1.0, 1e6 * kZ, kY, kX)) / 3.18309886183578464946978513e-13,
+              1.0, 1e-9);
+  EXPECT_NEAR(exchange_of(sliver, square(1.0, 0.5 * kZ, kY, kX)) / sliver_area /
+                  0.312898570354031758179973895097,
+              1.0, 1e-9);
+  EXPECT_NEAR(exchange_of(sliver, square(1.0, Vec3::Zero(), kZ, kX)) / sliver_area /
+                  0.499970570320873874409201724141,
+              1.0, 1e-9);
+}
+
 TEST(ExchangeArea, FarPairsFollowThePointKernel) {
   constexpr double kDistance = 1e3;
   const Polygon low = square(1.0, {-0.5, -0.5, 0}, kX, kY);
