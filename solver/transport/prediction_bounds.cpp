@@ -52,16 +52,19 @@ Eigen::VectorXd Prediction::solver_bounds() const {
   constexpr double kLinksAtMost = 3.0;
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(fine().indirect.cols());
   for (const auto& level : levels_) sum += level->solution.solve.error_bound;
-  if (fine().form_factors.closed)
+  if (fine().form_factors.closed) {
+    // Rows that miss more than kernels can lie partly under another surface: an error of the grid.
+    constexpr double kKernelsAtMost = 1e-3;
+    double row_error = fine().form_factors.closure_residual_max;
+    if (row_error > kKernelsAtMost) row_error = FormFactorOptions{}.relative_tolerance;
     for (Index k = 0; k < sum.size(); ++k) {
       double rho = 0.0;
       for (const Material& m : distinct_scene_.materials)
         rho = std::max(rho, m.reflectance[static_cast<std::size_t>(k)]);
       const double q = rho * std::max(1.0, fine().form_factors.row_sum_max);
-      if (q < 1.0)
-        sum[k] += fine().form_factors.closure_residual_max *
-                  fine().reflected.col(k).cwiseAbs().maxCoeff() / (1.0 - q);
+      if (q < 1.0) sum[k] += row_error * fine().reflected.col(k).cwiseAbs().maxCoeff() / (1.0 - q);
     }
+  }
   if (!fine().links) return sum;
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(sum.size());
   double area_m2 = 0.0;
