@@ -19,7 +19,7 @@ struct SolutionSurface {
 };
 
 /// Own exitance plus rho times the irradiance at each corner (direct light exact, indirect from the
-/// smooth field), a thousandth of the element inside it, so that an edge belongs to one side.
+/// gathered field), a thousandth of the element inside it, so that an edge belongs to one side.
 /// Bounds hold at the vertices; what a viewer interpolates between them may miss a shadow's edge.
 SolutionSurface solution_surface(const Prediction& prediction);
 

@@ -31,11 +31,11 @@ struct RenderedImage {
 };
 
 /// Radiance of each pixel: mean over low-discrepancy points of L = B / pi of the surface seen,
-/// direct light exact at every point, indirect light from the smooth field or a final gather. Backs
-/// are black, what leaves the scene is 0.
-/// The bound is the prediction's own plus, for the n-point mean, the range of the points times
-/// n^-3/4 where an edge crosses the pixel (its rate through a low-discrepancy set; Mitchell 1992)
-/// and times n^-1 where the radiance is smooth (Koksma-Hlawka).
+/// direct light exact at every point, indirect light from the gathered field or a final gather.
+/// Backs are black, what leaves the scene is 0. The bound is the prediction's own plus, for the
+/// n-point mean, the range of the points times n^-3/4 where an edge crosses the pixel (its rate
+/// through a low-discrepancy set; Mitchell 1992) and times n^-1 where the radiance is smooth
+/// (Koksma-Hlawka).
 RenderedImage render(const Prediction& prediction, const Camera& camera,
                      const RenderOptions& options);
 

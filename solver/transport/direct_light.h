@@ -15,4 +15,24 @@ BandMatrix mean_direct(const PatchMesh& mesh, const Scene& scene, const Gather& 
                        const ElementTree& tree, const ShaftCulling& culling,
                        const Progress& progress = {});
 
+/// Which lamps each element may see, and what may stand between: found once, asked at many points.
+class LitElements {
+ public:
+  struct Lamp {
+    std::uint32_t piece = 0;
+    Eigen::VectorXd exitance;            ///< W m^-2 nm^-1, one value a band
+    std::vector<std::uint32_t> between;  ///< pieces
+  };
+  LitElements(const PatchMesh& mesh, const Scene& scene, const ElementTree& tree,
+              const ShaftCulling& culling);
+
+  const std::vector<Lamp>& lamps_of(std::uint32_t patch) const { return lamps_[patch]; }
+  /// Whether something may stand between an element and one of its lamps.
+  bool is_partly_hidden(std::uint32_t patch) const { return partly_hidden_[patch]; }
+
+ private:
+  std::vector<std::vector<Lamp>> lamps_;
+  std::vector<char> partly_hidden_;
+};
+
 }  // namespace truebox

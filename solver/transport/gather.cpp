@@ -70,13 +70,20 @@ double Gather::factor_of_visible_parts(const Vec3& point, const Vec3& normal,
 
 double Gather::visible_factor(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon,
                               std::uint32_t piece, Scratch& scratch) const {
+  return visible_factor(point, normal, polygon, piece, blocker_piece_, scratch);
+}
+
+double Gather::visible_factor(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon,
+                              std::uint32_t piece, std::span<const std::uint32_t> between,
+                              Scratch& scratch) const {
   const Plane& plane = mesh_.pieces[piece].plane;
   if (plane.distance_m(point) <= tolerance_m_) return 0.0;  // sees its back or its edge
   const Plane horizon{normal, normal.dot(point)};
   if (!any_beyond(polygon, horizon, 1.0, tolerance_m_)) return 0.0;
   scratch.blockers.clear();
-  for (std::size_t b = 0; b < blockers_.size(); ++b)
-    add_if_between(b, point, horizon, polygon, piece, scratch);
+  for (std::uint32_t p : between)
+    if (blocker_of_[p] != kNone)
+      add_if_between(blocker_of_[p], point, horizon, polygon, piece, scratch);
   return factor_of_visible_parts(point, normal, polygon, plane, scratch);
 }
 
@@ -153,22 +160,54 @@ constexpr int kDeepestSplit =
 
 }  // namespace
 
-void Gather::add_near_field(const Vec3& point, const Vec3& normal, const Polygon& polygon,
-                            std::uint32_t patch, int halvings, const SourceAt& source_at,
-                            Scratch& scratch, Eigen::Ref<Eigen::RowVectorXd> sum) const {
-  const Vec3 centre = centroid(polygon);
-  if (diameter_m(polygon) > kNearField * (centre - point).norm() && halvings < kDeepestSplit) {
-    const std::vector<Polygon> parts = split(polygon);
-    for (const Polygon& part : parts)
-      add_near_field(point, normal, part, patch, halvings + (parts.size() == 2 ? 1 : 2), source_at,
-                     scratch, sum);
-    return;
+struct Gather::PartWalk {
+  const Gather& gather;
+  const Vec3 &point, &normal;
+  std::uint32_t piece;
+  double near_field;
+  const VisitPart& visit;
+  Scratch& scratch;
+
+  void run(const Polygon& polygon, int halvings) const {
+    if (!any_beyond(polygon, {normal, normal.dot(point)}, 1.0, gather.tolerance_m_)) return;
+    const Vec3 centre = centroid(polygon);
+    if (diameter_m(polygon) > near_field * (centre - point).norm() && halvings < kDeepestSplit) {
+      const std::vector<Polygon> parts = split(polygon);
+      for (const Polygon& part : parts) run(part, halvings + (parts.size() == 2 ? 1 : 2));
+      return;
+    }
+    const double factor =
+        gather.visible_factor(point, normal, polygon, piece, scratch.in_view, scratch);
+    if (factor > 0.0) visit(factor, centre, halvings / 2);
   }
-  const double factor = visible_factor(point, normal, polygon, mesh_.patches[patch].piece, scratch);
-  if (factor <= 0.0) return;
-  Eigen::VectorXd value(sum.size());
-  source_at(patch, centre, halvings / 2, value);
-  sum += factor * value.transpose();
+};
+
+// Those of `between` whose shadow falls on the polygon: few, and its many parts ask these alone.
+void Gather::keep_in_view(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon,
+                          std::uint32_t piece, std::span<const std::uint32_t> between,
+                          Scratch& scratch) const {
+  const Plane horizon{normal, normal.dot(point)};
+  const Plane& plane = mesh_.pieces[piece].plane;
+  scratch.in_view.clear();
+  for (std::uint32_t p : between) {
+    if (blocker_of_[p] == kNone) continue;
+    scratch.blockers.clear();
+    add_if_between(blocker_of_[p], point, horizon, polygon, piece, scratch);
+    if (scratch.blockers.empty()) continue;
+    const auto parts = scratch.parts(point, polygon, plane, scratch.blockers);
+    if (parts.size() != 1 ||
+        !std::equal(parts[0].begin(), parts[0].end(), polygon.begin(), polygon.end()))
+      scratch.in_view.push_back(p);
+  }
+}
+
+void Gather::visit_parts(const Vec3& point, const Vec3& normal, const Polygon& polygon,
+                         std::uint32_t piece, double near_field,
+                         std::span<const std::uint32_t> between, const VisitPart& visit,
+                         Scratch& scratch) const {
+  if (mesh_.pieces[piece].plane.distance_m(point) <= tolerance_m_) return;
+  keep_in_view(point, normal, polygon, piece, between, scratch);
+  PartWalk{*this, point, normal, piece, near_field, visit, scratch}.run(polygon, 0);
 }
 
 BandMatrix Gather::from_surfaces(const Vec3& point, const Vec3& normal, const BandMatrix& radiosity,
@@ -177,7 +216,7 @@ BandMatrix Gather::from_surfaces(const Vec3& point, const Vec3& normal, const Ba
       BandMatrix::Zero(static_cast<Eigen::Index>(scene_.surfaces.size()), radiosity.cols());
   const Plane horizon{normal, normal.dot(point)};
   Polygon polygon;
-  Eigen::RowVectorXd near(radiosity.cols());
+  Eigen::VectorXd value(radiosity.cols());
   for (std::uint32_t p = 0; p < mesh_.pieces.size(); ++p) {
     const Piece& piece = mesh_.pieces[p];
     if (piece.plane.distance_m(point) <= tolerance_m_ ||
@@ -187,9 +226,11 @@ BandMatrix Gather::from_surfaces(const Vec3& point, const Vec3& normal, const Ba
     for (std::uint32_t j = piece.first_patch; j < piece.first_patch + piece.patch_count; ++j) {
       mesh_.polygon_of(mesh_.patches[j], polygon);
       if (diameter_m(polygon) > kNearField * (mesh_.patches[j].centroid - point).norm()) {
-        near.setZero();
-        add_near_field(point, normal, polygon, j, 0, source_at, scratch, near);
-        row += near;
+        const auto add = [&](double factor, const Vec3& centre, int depth) {
+          source_at(j, centre, depth, value);
+          row += factor * value.transpose();
+        };
+        visit_parts(point, normal, polygon, p, kNearField, blocker_piece_, add, scratch);
         continue;
       }
       const double factor = visible_factor(point, normal, polygon, p, scratch);

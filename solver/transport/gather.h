@@ -20,6 +20,7 @@ class Gather {
     VisibleParts parts;
     Polygon polygon;
     std::vector<const Blocker*> blockers;
+    std::vector<std::uint32_t> in_view;
   };
 
   Gather(const PatchMesh& mesh, const Scene& scene, bool occlusion);
@@ -27,6 +28,18 @@ class Gather {
   /// Visible view factor from a surface element to a convex polygon on `piece`, in [0, 1].
   double visible_factor(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon,
                         std::uint32_t piece, Scratch& scratch) const;
+  /// The same where no other pieces than `between` may block.
+  double visible_factor(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon,
+                        std::uint32_t piece, std::span<const std::uint32_t> between,
+                        Scratch& scratch) const;
+
+  /// Cuts a polygon on `piece` until each part is shorter than `near_field` times its distance from
+  /// the point, and hands on each part's visible factor, its centroid and how often the polygon was
+  /// cut in four to get there. Only pieces of `between` may block.
+  using VisitPart = std::function<void(double factor, const Vec3& centre, int depth)>;
+  void visit_parts(const Vec3& point, const Vec3& normal, const Polygon& polygon,
+                   std::uint32_t piece, double near_field, std::span<const std::uint32_t> between,
+                   const VisitPart& visit, Scratch& scratch) const;
 
   /// Mean visible factor from an element to a whole luminous piece, where no other pieces than
   /// `between` may block: closed form if none, otherwise 4 x 4 Gauss points of exact visibility.
@@ -51,9 +64,10 @@ class Gather {
   static constexpr double kNearField = 0.5;
 
  private:
-  void add_near_field(const Vec3& point, const Vec3& normal, const Polygon& polygon,
-                      std::uint32_t patch, int halvings, const SourceAt& source_at,
-                      Scratch& scratch, Eigen::Ref<Eigen::RowVectorXd> sum) const;
+  struct PartWalk;
+  void keep_in_view(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon,
+                    std::uint32_t piece, std::span<const std::uint32_t> between,
+                    Scratch& scratch) const;
   double factor_of_visible_parts(const Vec3& point, const Vec3& normal,
                                  std::span<const Vec3> polygon, const Plane& plane,
                                  Scratch& scratch) const;
@@ -63,7 +77,7 @@ class Gather {
   const PatchMesh& mesh_;
   const Scene& scene_;
   std::vector<Blocker> blockers_;
-  std::vector<std::uint32_t> blocker_piece_;
+  std::vector<std::uint32_t> blocker_piece_;  ///< pieces that may block anything
   std::vector<std::uint32_t>
       blocker_of_;  ///< of each piece, into blockers_; kNone if it blocks nothing
   std::vector<std::uint32_t> luminous_pieces_;

@@ -63,6 +63,8 @@ Prediction::Prediction(const Scene& scene, const PredictOptions& options)
     error_shares_ = find_error_shares(*solve_level(edge_m, 1, again));
   }
   visibility_ = std::make_unique<Visibility>(fine().mesh, scene);
+  gathers_field_ =
+      needs_.interreflection && !fine().links && fine().mesh.size() <= options.gathered_up_to;
 }
 
 PatchMesh Prediction::mesh_of(double edge_m, int split, const PredictOptions& options) const {
@@ -166,6 +168,18 @@ const SmoothField& Prediction::Level::smooth() const {
     smooth_field = std::make_unique<SmoothField>(solution.mesh, solution.usable, solution.indirect);
   });
   return *smooth_field;
+}
+
+const GatheredField& Prediction::Level::gathered(const Scene& scene, bool occlusion) const {
+  std::call_once(gathered_once, [&] {
+    gathered_field = std::make_unique<GatheredField>(FieldSources{
+        solution.mesh, scene, solution.usable, solution.reflected, smooth(), *gather, occlusion});
+  });
+  return *gathered_field;
+}
+
+const GatheredField& Prediction::gathered(std::size_t level) const {
+  return levels_[level]->gathered(distinct_scene_, needs_.occlusion);
 }
 
 SolveOutcome Prediction::outcome() const {
@@ -304,8 +318,14 @@ BoundedIrradiance Prediction::irradiance_on(std::uint32_t piece, const Vec3& poi
   Eigen::VectorXd value = Eigen::VectorXd::Zero(bands), bound = Eigen::VectorXd::Zero(bands);
   if (needs_.interreflection) {
     const std::uint32_t patch = levels_[0]->smooth().find_patch(piece, point);
-    levels_[0]->smooth().evaluate(patch, point, value);
-    bound = indirect_bound().row(patch).transpose();
+    if (gathers_field_) {
+      const std::uint32_t cell = gathered(0).find_cell(patch, point);
+      bound = gathered_bound().row(cell).transpose();
+      best_field_->evaluate(cell, point, value);
+    } else {
+      levels_[0]->smooth().evaluate(patch, point, value);
+      bound = indirect_bound().row(patch).transpose();
+    }
   }
   levels_[0]->gather->add_direct(point, fine().mesh.pieces[piece].plane.normal, value, scratch);
   bound += kRounding * value;

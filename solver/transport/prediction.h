@@ -13,6 +13,7 @@
 #include "transport/form_factors.h"
 #include "transport/found_exchange.h"
 #include "transport/gather.h"
+#include "transport/gathered_field.h"
 #include "transport/solve_radiosity.h"
 #include "transport/visibility.h"
 
@@ -53,6 +54,9 @@ struct PredictOptions {
   /// Nothing said: where the finest grid is too coarse to extrapolate (bound_is_reliable);
   /// elsewhere extrapolation takes the same error off, and more.
   std::optional<bool> near_sources;
+  /// Up to this many elements of the fine grid `irradiance_on` takes the gathered field, whose cost
+  /// grows with the square of that number; beyond, and with links, the smooth field.
+  std::size_t gathered_up_to = 20000;
   bool error_shares = false;   ///< solve the middle grid twice, to tell what part is the factors'
   bool sensitivities = false;  ///< of the fine grid to each material's reflectance
   SolveGrid solve_grid;        ///< instead of a matrix or links in this process; may be empty
@@ -98,13 +102,15 @@ struct BoundedIrradiance {
 /// The error bound is a posteriori. Direct light carries rounding only. Indirect light is wrong by
 /// the grid, the sampled visibility and the solver. The first two differ between the grids; with an
 /// order of convergence p, |e_h| <= |I_h - I_2h| / (2^p - 1). Gathered irradiance takes p = 1
-/// (measured: 1.7 to 2), surface by surface and without sign, so that differences cannot cancel;
-/// values at a point of a surface take p = lambda, the exponent of the edge singularity, and the
-/// largest difference in the element. Two grids that agree by chance are found out by the third:
-/// I_h - I_2h counts for no less than (I_2h - I_4h) / 2^p of the expected order. The solver's own
-/// bound is added. Neither grid's sampled visibility knows the others'. Where all three grids are
-/// too coarse to see a feature the bound cannot know of it: corner tips, and solves of a few
-/// hundred elements. Source: grid convergence index, Roache (1994), safety factor 3 for p = 2.
+/// (measured: 1.7 to 2), surface by surface and without sign, so that differences cannot cancel; so
+/// do points of a surface, whose gathered field resolves edges, by the largest difference in a
+/// cell; where the smooth field stands for it, and on elements, p = lambda, the exponent of the
+/// edge singularity, and the largest difference in the element. Two grids that agree by chance are
+/// found out by the third: I_h - I_2h counts for no less than (I_2h - I_4h) / 2^p of the expected
+/// order. The solver's own bound is added. Neither grid's sampled visibility knows the others'.
+/// Where all three grids are too coarse to see a feature the bound cannot know of it: corner tips,
+/// and solves of a few hundred elements. Source: grid convergence index, Roache (1994), safety
+/// factor 3 for p = 2.
 class Prediction {
  public:
   /// Solves. Check `outcome()` before using the answer. The scene must outlive the prediction.
@@ -132,7 +138,9 @@ class Prediction {
   /// Irradiance of a surface element anywhere in the scene by gathering; bands of the scene.
   BoundedIrradiance irradiance_at(const Vec3& point, const Vec3& normal) const;
 
-  /// Irradiance at a point of a surface: direct light exact, indirect light from the smooth field.
+  /// Irradiance at a point of a surface: direct light exact, indirect light from the gathered
+  /// field, extrapolated from two grids like gathered values (or the smooth field:
+  /// `gathered_up_to`). The first call builds the fields of all grids.
   BoundedIrradiance irradiance_on(std::uint32_t piece, const Vec3& point,
                                   Gather::Scratch& scratch) const;
 
@@ -160,10 +168,12 @@ class Prediction {
 
     /// Built when first asked for: means need none.
     const SmoothField& smooth() const;
+    const GatheredField& gathered(const Scene& scene, bool occlusion) const;
 
    private:
-    mutable std::once_flag smooth_once;
+    mutable std::once_flag smooth_once, gathered_once;
     mutable std::unique_ptr<SmoothField> smooth_field;
+    mutable std::unique_ptr<GatheredField> gathered_field;
   };
 
   PatchMesh mesh_of(double edge_m, int split, const PredictOptions& options) const;
@@ -175,7 +185,10 @@ class Prediction {
   /// Bound of the indirect irradiance within each element, found when first asked for.
   const BandMatrix& indirect_bound() const;
   void compare_grids() const;
-  void share_bounds_at_contacts() const;
+  /// The same within each cell of the gathered field.
+  const BandMatrix& gathered_bound() const;
+  void compare_gathered() const;
+  const GatheredField& gathered(std::size_t level) const;
   Eigen::VectorXd extrapolated(const Eigen::VectorXd& fine, const Eigen::VectorXd& coarse) const;
   Eigen::VectorXd indirect_mean(const Level& level, std::uint32_t piece, const Polygon& part) const;
   Eigen::VectorXd direct_mean(std::uint32_t patch, const Polygon& part, bool is_whole) const;
@@ -190,8 +203,11 @@ class Prediction {
   std::array<std::unique_ptr<Level>, 3> levels_;  // finest first
   std::unique_ptr<Visibility> visibility_;
   std::optional<ErrorShares> error_shares_;
-  mutable std::once_flag compared_;
+  bool gathers_field_ = false;
+  mutable std::once_flag compared_, compared_gathered_;
   mutable BandMatrix indirect_bound_;  // elements of the finest grid x distinct bands
+  mutable std::unique_ptr<GatheredField> best_field_;  // the finest grid's, extrapolated
+  mutable BandMatrix gathered_bound_;                  // cells of the finest grid x distinct bands
 };
 
 }  // namespace truebox

@@ -41,6 +41,27 @@ Eigen::VectorXd pointwise_factor(const Scene& scene) {
   return factor;
 }
 
+// Where another surface stands on this one the light turns around its corners within an element:
+// by chance one of them may agree on all grids, so those that meet there share the largest.
+void share_bounds_at_contacts(const PatchMesh& mesh, const std::vector<char>& usable,
+                              BandMatrix& bound) {
+  std::vector<std::vector<std::uint32_t>> patches_at(mesh.vertices.size());
+  std::vector<char> is_contact(mesh.vertices.size(), 0);
+  for (std::uint32_t i = 0; i < mesh.size(); ++i)
+    for (std::uint32_t v : mesh.corners_of(mesh.patches[i])) {
+      if (usable[i])
+        patches_at[v].push_back(i);
+      else
+        is_contact[v] = 1;
+    }
+  const BandMatrix own = bound;
+  for (std::size_t v = 0; v < patches_at.size(); ++v) {
+    if (!is_contact[v]) continue;
+    for (std::uint32_t i : patches_at[v])
+      for (std::uint32_t j : patches_at[v]) bound.row(i) = bound.row(i).cwiseMax(own.row(j));
+  }
+}
+
 }  // namespace
 
 // A solver's bound holds for every element, so for any mean of them. What the form factors' own
@@ -113,30 +134,52 @@ void Prediction::compare_grids() const {
             compare(patch.centroid + 0.95 * (mesh.vertices[v] - patch.centroid));
         }
       });
-  share_bounds_at_contacts();
+  share_bounds_at_contacts(mesh, fine().usable, indirect_bound_);
   indirect_bound_.rowwise() += solver_bounds().transpose();
 }
 
-// Where another surface stands on this one the light turns around its corners within an element:
-// by chance one of them may agree on all grids, so those that meet there share the largest.
-void Prediction::share_bounds_at_contacts() const {
-  const PatchMesh& mesh = fine().mesh;
-  std::vector<std::vector<std::uint32_t>> patches_at(mesh.vertices.size());
-  std::vector<char> is_contact(mesh.vertices.size(), 0);
-  for (std::uint32_t i = 0; i < mesh.size(); ++i)
-    for (std::uint32_t v : mesh.corners_of(mesh.patches[i])) {
-      if (fine().usable[i])
-        patches_at[v].push_back(i);
-      else
-        is_contact[v] = 1;
-    }
-  const BandMatrix own = indirect_bound_;
-  for (std::size_t v = 0; v < patches_at.size(); ++v) {
-    if (!is_contact[v]) continue;
-    for (std::uint32_t i : patches_at[v])
-      for (std::uint32_t j : patches_at[v])
-        indirect_bound_.row(i) = indirect_bound_.row(i).cwiseMax(own.row(j));
-  }
+const BandMatrix& Prediction::gathered_bound() const {
+  std::call_once(compared_gathered_, [this] { compare_gathered(); });
+  return gathered_bound_;
+}
+
+void Prediction::compare_gathered() const {
+  const PatchMesh& mesh = gathered(0).cells().mesh;
+  const auto bands = fine().indirect.cols();
+  gathered_bound_ = BandMatrix::Zero(static_cast<Index>(mesh.size()), bands);
+  std::vector<char> usable(mesh.size());
+  for (std::size_t c = 0; c < mesh.size(); ++c)
+    usable[c] = fine().usable[gathered(0).cells().parent[c]];
+  for (const std::size_t k : {1, 2}) gathered(k);  // in parallel inside, so not from within a loop
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.size())),
+                    [&](const auto& range) {
+                      Eigen::VectorXd at[3] = {Eigen::VectorXd(bands), Eigen::VectorXd(bands),
+                                               Eigen::VectorXd(bands)};
+                      for (std::uint32_t c = range.begin(); c < range.end(); ++c) {
+                        if (!usable[c]) continue;
+                        const Patch& cell = mesh.patches[c];
+                        std::uint32_t element[3] = {gathered(0).cells().parent[c], 0, 0};
+                        for (int k = 1; k < 3; ++k)
+                          element[k] = levels_[k]->smooth().find_patch(cell.piece, cell.centroid);
+                        const auto compare = [&](const Vec3& point) {
+                          gathered(0).evaluate(c, point, at[0]);
+                          for (std::size_t k = 1; k < 3; ++k)
+                            gathered(k).evaluate(gathered(k).find_cell(element[k], point), point,
+                                                 at[k]);
+                          gathered_bound_.row(c) = gathered_bound_.row(c).cwiseMax(
+                              guarded_difference(at[0], at[1], at[2], kGatheredOrder).transpose());
+                        };
+                        compare(cell.centroid);
+                        for (std::uint32_t v : mesh.corners_of(cell))
+                          compare(cell.centroid + 0.95 * (mesh.vertices[v] - cell.centroid));
+                      }
+                    });
+  share_bounds_at_contacts(mesh, usable, gathered_bound_);
+  // What extrapolation moves the field by is added: with coarse cells it may be the wrong way.
+  const double share = bound_is_reliable() ? 1.0 / kRichardson : 0.0;
+  gathered_bound_ *= 1.0 + share;
+  gathered_bound_.rowwise() += solver_bounds().transpose();
+  best_field_ = std::make_unique<GatheredField>(gathered(0).extrapolated(gathered(1), share));
 }
 
 ErrorShares Prediction::find_error_shares(const Level& resampled) const {
