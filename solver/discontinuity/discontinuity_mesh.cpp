@@ -193,11 +193,12 @@ namespace {
 // common does so a hundred times: minutes, beyond that.
 constexpr std::size_t kMostLooks = 2000000;
 
-void require_few_pairs(const PatchMesh& pieces, const Scene& scene) {
-  std::size_t lamps = 0;
-  for (const Piece& piece : pieces.pieces)
-    lamps += scene.material_of(scene.surfaces[piece.surface]).emits();
-  const std::size_t count = pieces.pieces.size();
+void require_few_pairs(const Scene& scene) {
+  std::size_t lamps = 0, count = 0;
+  for (const Surface& surface : scene.surfaces) {
+    count += surface.pieces.size();
+    if (scene.material_of(surface).emits()) lamps += surface.pieces.size();
+  }
   if (static_cast<double>(count) * static_cast<double>(count) * static_cast<double>(lamps) >
       static_cast<double>(kMostLooks))
     throw std::length_error("lines of " + std::to_string(lamps) + " luminaires on " +
@@ -210,8 +211,8 @@ void require_few_pairs(const PatchMesh& pieces, const Scene& scene) {
 
 std::vector<std::vector<DiscontinuityLine>> lines_of_light(const Scene& scene,
                                                            const DiscontinuityOptions& options) {
+  require_few_pairs(scene);
   const PatchMesh pieces = uniform_mesh(scene, scene.diameter_m());
-  require_few_pairs(pieces, scene);
   const Gather gather(pieces, scene, true);
   const ShaftCulling culling(pieces, scene, true);
   const LineOptions line_options{edge_for_count(scene, options.cells),
