@@ -102,15 +102,14 @@ struct BoundedIrradiance {
 /// The error bound is a posteriori. Direct light carries rounding only. Indirect light is wrong by
 /// the grid, the sampled visibility and the solver. The first two differ between the grids; with an
 /// order of convergence p, |e_h| <= |I_h - I_2h| / (2^p - 1). Gathered irradiance takes p = 1
-/// (measured: 1.7 to 2), surface by surface and without sign, so that differences cannot cancel; so
-/// do points of a surface, whose gathered field resolves edges, by the largest difference in a
-/// cell; where the smooth field stands for it, and on elements, p = lambda, the exponent of the
-/// edge singularity, and the largest difference in the element. Two grids that agree by chance are
-/// found out by the third: I_h - I_2h counts for no less than (I_2h - I_4h) / 2^p of the expected
-/// order. The solver's own bound is added. Neither grid's sampled visibility knows the others'.
-/// Where all three grids are too coarse to see a feature the bound cannot know of it: corner tips,
-/// and solves of a few hundred elements. Source: grid convergence index, Roache (1994), safety
-/// factor 3 for p = 2.
+/// (measured: 1.7 to 2), surface by surface and without sign, so that differences cannot cancel;
+/// values at a point of a surface, or of a cell of the gathered field, take p = lambda, the
+/// exponent of the edge singularity, and the largest difference in the element or cell. Two grids
+/// that agree by chance are found out by the third: I_h - I_2h counts for no less than (I_2h -
+/// I_4h) / 2^p of the expected order. The solver's own bound is added. Neither grid's sampled
+/// visibility knows the others'. Where all three grids are too coarse to see a feature the bound
+/// cannot know of it: corner tips, and solves of a few hundred elements. Source: grid convergence
+/// index, Roache (1994), safety factor 3 for p = 2.
 class Prediction {
  public:
   /// Solves. Check `outcome()` before using the answer. The scene must outlive the prediction.

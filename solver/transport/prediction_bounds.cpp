@@ -146,34 +146,37 @@ const BandMatrix& Prediction::gathered_bound() const {
 void Prediction::compare_gathered() const {
   const PatchMesh& mesh = gathered(0).cells().mesh;
   const auto bands = fine().indirect.cols();
+  const Eigen::VectorXd factor = pointwise_factor(distinct_scene_);
   gathered_bound_ = BandMatrix::Zero(static_cast<Index>(mesh.size()), bands);
   std::vector<char> usable(mesh.size());
   for (std::size_t c = 0; c < mesh.size(); ++c)
     usable[c] = fine().usable[gathered(0).cells().parent[c]];
   for (const std::size_t k : {1, 2}) gathered(k);  // in parallel inside, so not from within a loop
-  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.size())),
-                    [&](const auto& range) {
-                      Eigen::VectorXd at[3] = {Eigen::VectorXd(bands), Eigen::VectorXd(bands),
-                                               Eigen::VectorXd(bands)};
-                      for (std::uint32_t c = range.begin(); c < range.end(); ++c) {
-                        if (!usable[c]) continue;
-                        const Patch& cell = mesh.patches[c];
-                        std::uint32_t element[3] = {gathered(0).cells().parent[c], 0, 0};
-                        for (int k = 1; k < 3; ++k)
-                          element[k] = levels_[k]->smooth().find_patch(cell.piece, cell.centroid);
-                        const auto compare = [&](const Vec3& point) {
-                          gathered(0).evaluate(c, point, at[0]);
-                          for (std::size_t k = 1; k < 3; ++k)
-                            gathered(k).evaluate(gathered(k).find_cell(element[k], point), point,
-                                                 at[k]);
-                          gathered_bound_.row(c) = gathered_bound_.row(c).cwiseMax(
-                              guarded_difference(at[0], at[1], at[2], kGatheredOrder).transpose());
-                        };
-                        compare(cell.centroid);
-                        for (std::uint32_t v : mesh.corners_of(cell))
-                          compare(cell.centroid + 0.95 * (mesh.vertices[v] - cell.centroid));
-                      }
-                    });
+  tbb::parallel_for(
+      tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.size())),
+      [&](const auto& range) {
+        Eigen::VectorXd at[3] = {Eigen::VectorXd(bands), Eigen::VectorXd(bands),
+                                 Eigen::VectorXd(bands)};
+        for (std::uint32_t c = range.begin(); c < range.end(); ++c) {
+          if (!usable[c]) continue;
+          const Patch& cell = mesh.patches[c];
+          std::uint32_t element[3] = {gathered(0).cells().parent[c], 0, 0};
+          for (int k = 1; k < 3; ++k)
+            element[k] = levels_[k]->smooth().find_patch(cell.piece, cell.centroid);
+          const auto compare = [&](const Vec3& point) {
+            gathered(0).evaluate(c, point, at[0]);
+            for (std::size_t k = 1; k < 3; ++k)
+              gathered(k).evaluate(gathered(k).find_cell(element[k], point), point, at[k]);
+            const Eigen::VectorXd guard = guarded_difference(at[0], at[1], at[2], kGatheredOrder);
+            const Eigen::VectorXd own = factor.cwiseProduct((at[0] - at[1]).cwiseAbs());
+            gathered_bound_.row(c) =
+                gathered_bound_.row(c).cwiseMax(guard.cwiseMax(own).transpose());
+          };
+          compare(cell.centroid);
+          for (std::uint32_t v : mesh.corners_of(cell))
+            compare(cell.centroid + 0.95 * (mesh.vertices[v] - cell.centroid));
+        }
+      });
   share_bounds_at_contacts(mesh, usable, gathered_bound_);
   // What extrapolation moves the field by is added: with coarse cells it may be the wrong way.
   const double share = bound_is_reliable() ? 1.0 / kRichardson : 0.0;
