@@ -4,6 +4,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -194,9 +195,9 @@ class LinkRefinement::Walk {
       return;
     }
     if (node(k).is_leaf()) {
-      const auto p = parent_.kernel_.points(parent_.tree_.order[node(k).begin], order_);
-      for (std::uint32_t q = 0; q < p.count; ++q)
-        points_.push_back({{p.x[q], p.y[q], p.z[q]}, p.weight_m2[q]});
+      const std::uint32_t patch = parent_.tree_.order[node(k).begin];
+      const PatchPoints p = of_element_.fill(parent_.polygons_[patch], order_);
+      for (std::uint32_t q = 0; q < p.count; ++q) points_.push_back({p.at(q), p.weight_at(q)});
       return;
     }
     const double at = 1.0 / std::sqrt(3.0);  // 2 x 2 points give the variance of a linear share
@@ -419,6 +420,7 @@ class LinkRefinement::Walk {
   Polygon outline_a_, outline_b_;
   std::vector<const Blocker*> between_;
   std::vector<WeightedPoint> points_;
+  PatchPointBuffer of_element_;
   int order_ = 3;  // of the Gauss points of elements
 };
 
@@ -439,6 +441,19 @@ void Links::append(Links&& other) {
   other = {};
 }
 
+namespace {
+
+constexpr double kOneSide = 2e-9;  // of the scene: what may reach behind an element's plane
+
+double diameter_m(const PatchMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const Piece& piece : mesh.pieces)
+    for (const Vec3& v : piece.polygon) box.extend(v);
+  return box.diagonal().norm();
+}
+
+}  // namespace
+
 LinkRefinement::LinkRefinement(const PatchMesh& mesh, const Visibility& visibility,
                                const GroupBasis& basis, const ShaftCulling& culling,
                                double kernel_tolerance, std::uint64_t seed)
@@ -448,7 +463,7 @@ LinkRefinement::LinkRefinement(const PatchMesh& mesh, const Visibility& visibili
       culling_(culling),
       samples_(group_samples(mesh, basis.tree, seed)),
       polygons_(planar_polygons(mesh)),
-      kernel_(polygons_, kernel_tolerance) {
+      kernel_(polygons_, basis.tree.order, kernel_tolerance, kOneSide * diameter_m(mesh)) {
   for (const Piece& piece : mesh.pieces) blockers_.push_back({piece.polygon, piece.plane});
 }
 

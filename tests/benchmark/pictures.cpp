@@ -2,7 +2,6 @@
 // Error against time for a picture: radiosity with exact direct light, and path tracing.
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <map>
 #include <memory>
 #include <random>
@@ -19,13 +18,6 @@ constexpr int kPixels = 500;             // picked at random; the truth of all w
 constexpr double kTruthNoise = 2.5e-3;   // one standard error of a pixel and band
 constexpr int kFirstSamples = 16384;     // tell how many a pixel needs
 constexpr int kMostSamples = 8'388'608;  // dark corners
-
-template <class Work>
-double processor_seconds(const Work& work) {
-  const std::clock_t start = std::clock();
-  work();
-  return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-}
 
 Camera camera_of(const Scene& scene, int side_px) {
   CameraDescription description = scene.cameras.at("front");
