@@ -20,6 +20,8 @@
 
 namespace truebox::app {
 namespace {
+
+constexpr std::size_t kMostGathered = 20000;  // elements: minutes of gathering
 // Of a target error, unless --elements says where to start: its bound foretells the rest.
 constexpr std::size_t kFirstElements = 1000;
 
@@ -161,6 +163,7 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
     options.find_exchange = streamed_exchange;
     options.solve.share_bands = false;  // every pass makes the matrix anew, for one band or for all
   }
+  if (a.gather_edges) options.gathered_up_to = kMostGathered;
   options.solve_grid = a.solve_grid;
   options.watch_finest = a.watch_finest;
   options.form_factors.memory_limit_bytes = a.memory_MiB << 20;

@@ -54,9 +54,10 @@ struct PredictOptions {
   /// Nothing said: where the finest grid is too coarse to extrapolate (bound_is_reliable);
   /// elsewhere extrapolation takes the same error off, and more.
   std::optional<bool> near_sources;
-  /// Up to this many elements of the fine grid `irradiance_on` takes the gathered field, whose cost
-  /// grows with the square of that number; beyond, and with links, the smooth field.
-  std::size_t gathered_up_to = 20000;
+  /// Up to this many elements of the fine grid `irradiance_on` takes the gathered field, which
+  /// follows the light into edges and whose cost grows with the square of that number; beyond, and
+  /// with links, the smooth field.
+  std::size_t gathered_up_to = 0;
   bool error_shares = false;   ///< solve the middle grid twice, to tell what part is the factors'
   bool sensitivities = false;  ///< of the fine grid to each material's reflectance
   SolveGrid solve_grid;        ///< instead of a matrix or links in this process; may be empty

@@ -119,13 +119,14 @@ PictureBenchmark measure_pictures(const Scene& scene, const std::vector<std::siz
               row);
     result.rows.push_back(row);
   }
-  for (std::size_t count : elements) {
-    PictureError row{"radiosity", static_cast<int>(count)};
+  const auto add_radiosity = [&](std::size_t count, bool gathered) {
+    PictureError row{gathered ? "radiosity, edges" : "radiosity", static_cast<int>(count)};
     RenderedImage image;
     std::unique_ptr<Prediction> prediction;
     row.solve_s = processor_seconds([&] {
       PredictOptions options;
       options.elements = count;
+      options.gathered_up_to = gathered ? 20000 : 0;
       prediction = std::make_unique<Prediction>(scene, options);
     });
     row.processor_s = row.solve_s + processor_seconds([&] {
@@ -138,7 +139,9 @@ PictureBenchmark measure_pictures(const Scene& scene, const std::vector<std::siz
                   }),
               row);
     result.rows.push_back(row);
-  }
+  };
+  for (const bool gathered : {false, true})
+    for (std::size_t count : elements) add_radiosity(count, gathered);
   return result;
 }
 

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <random>
 
-#include "support/tiny_scenes.h"
 #include "support/cracks.h"
+#include "support/tiny_scenes.h"
 #include "transport/prediction.h"
 #include "transport/strip_galerkin.h"
 
@@ -117,7 +117,9 @@ TEST(GatheredField, ReproducesAFurnaceUpToItsEdgesAndCorners) {
   // Closed, rho = 1/2, M = 1 everywhere: E = B = 2, in corners and at the block's foot as well.
   const Scene scene = tiny::cube_with_block(1.0, 0.5, 1.0);
   PredictOptions options;
-  options.elements = 400;
+  options.elements = 200;
+  options.gathered_up_to = 20000;
+  options.form_factors.method = FormFactorMethod::ray_casting;  // closes rows under the block too
   options.solve.relative_bound = 1e-10;
   const Prediction prediction(scene, options);
   ASSERT_EQ(prediction.outcome(), SolveOutcome::converged);
@@ -161,6 +163,7 @@ class Duct : public testing::Test {
   PredictOptions options() const {
     PredictOptions options;
     options.elements = 1000;  // edges of 0.25
+    options.gathered_up_to = 20000;
     return options;
   }
   const Scene scene_ = duct();
@@ -200,14 +203,15 @@ TEST_F(Duct, IsKnownToOnePercentAtItsEdges) {
       worst_smooth = std::max(worst_smooth, std::abs(rough.value[0] / truth - 1.0));
     }
   EXPECT_GT(worst_smooth, 2.0 * kWanted) << "elements alone would do";
-  // The exponent of the rise, from steps of two, so that the value at the edge drops out; between
-  // layers that both follow it, a tenth of it would be seen as 7 % of a step.
+  // The exponent of the rise, from steps of two, so that the value at the edge drops out. A step is
+  // 0.5 % of the light: 0.2 of the exponent is 15 % of a step, 1e-3 of the light. A field that is
+  // linear there, as one of elements is, would be off by 0.45.
   const auto exponent = [](const auto& at) {
     const double d = 0.25 / 16;
     return std::log2((at(2 * d) - at(d)) / (at(d) - at(d / 2)));
   };
   EXPECT_NEAR(exponent([&](double d) { return irradiance(prediction, false, d).value[0]; }),
-              exponent([&](double d) { return true_irradiance(false, d); }), 0.05);
+              exponent([&](double d) { return true_irradiance(false, d); }), 0.2);
 }
 
 }  // namespace

@@ -173,7 +173,7 @@ TEST(Plan, LeavesInterreflectionOutWhereNothingReflects) {
 TEST(Plan, FindsTheBandsOfFewMaterialsOnABasis) {
   const Scene box = cornell_box();
   const Plan plan = make_plan(box, target(0.2));
-  EXPECT_LT(plan.bands_solved, 40u);
+  EXPECT_LT(plan.bands_solved, box.bands.size());
   const auto claims = check_claims(box, plan, 300);
   ASSERT_GE(claims.size(), 2u);
   for (const ClaimCheck& claim : claims)
