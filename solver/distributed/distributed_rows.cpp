@@ -103,6 +103,7 @@ void DistributedRows::fill(const PatchMesh& mesh, const Scene& scene,
   ExactFormFactorOptions exact;
   exact.relative_tolerance = options.relative_tolerance;
   exact.occlusion = options.occlusion;
+  exact.outline_points = options.outline_points;
   const auto begin = static_cast<std::size_t>(partition_.begin());
   const auto count = static_cast<std::size_t>(partition_.local());
   rows_.resize(partition_.local(), partition_.rows());

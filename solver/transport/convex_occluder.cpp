@@ -114,9 +114,16 @@ class Grouping {
             {positions_[a], positions_[b], face_of[p], other ? face_of[*other] : missing});
       }
     if (!rim.empty() && !close(rim, result)) return std::nullopt;
-    for (const Plane& face : result.faces)
-      for (const Vec3& v : result.corners)
+    for (const Plane& face : result.faces) {
+      double deepest_m = 0.0;
+      for (const Vec3& v : result.corners) {
         if (face.distance_m(v) > tolerance_m_) return std::nullopt;
+        deepest_m = std::min(deepest_m, face.distance_m(v));
+      }
+      // Both sides of a sheet, or parts of one polygon: without thickness, faces alone hide
+      // nothing.
+      if (deepest_m >= -tolerance_m_) return std::nullopt;
+    }
     for (const Vec3& v : result.corners) result.box.extend(v);
     if (!rim.empty() && holds_something(result)) return std::nullopt;
     return result;

@@ -149,7 +149,7 @@ class ExactPairs {
       error = std::abs(finer.mean - share.mean);
       share = finer;
     }
-    return share.mean * whole;
+    return std::max(0.0, share.mean * whole);  // a share is found by differences, too
   }
 
  private:

@@ -74,15 +74,15 @@ TEST(FitSceneProgram, ExitsWithFiveAndNamesTheNullDirection) {
 }
 
 TEST(FitSceneProgram, EndsCleanlyAtCtrlCDuringFormFactors) {
-  // So many elements that form factors take far longer than the three seconds until SIGINT.
+  // So many elements that form factors take far longer than the six seconds until SIGINT.
   std::string path = measurement("");
   std::ifstream file(path);
   std::string text{std::istreambuf_iterator<char>(file), {}};
-  text.replace(text.find("elements = 400"), 14, "elements = 12000");
+  text.replace(text.find("elements = 400"), 14, "elements = 20000");
   write_file_atomically(path, text);
   const std::string json = scratch_path("stopped.json"), directory = scratch_path("stopped");
   const CommandOutcome result =
-      run_command("timeout --preserve-status -s INT 3 '" TRUEBOX_PROGRAM "' fit " + path + " -o " +
+      run_command("timeout --preserve-status -s INT 6 '" TRUEBOX_PROGRAM "' fit " + path + " -o " +
                   json + " --report " + directory);
   EXPECT_EQ(result.code, 5) << result.text;
   EXPECT_THAT(result.text, HasSubstr("stopped by the user before there was a fit"));

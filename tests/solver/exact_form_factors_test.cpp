@@ -53,6 +53,19 @@ TEST(ExactFormFactors, CloseARoomWithABlock) {
   }
 }
 
+TEST(ExactFormFactors, SeeBothSidesOfASheetHide) {
+  // Both sides share all edges, in one plane: no solid, or light would pass. Where a sheet hides
+  // nothing rows sum to more than one, by what it takes up of their view.
+  Scene scene = tiny::cube(1.0, 0.0);
+  const Polygon sheet{{0.3, 0.2, 0.4}, {0.8, 0.2, 0.4}, {0.8, 0.8, 0.4}, {0.3, 0.8, 0.4}};
+  scene.surfaces.push_back(
+      {"sheet", 0, {sheet, Polygon(sheet.rbegin(), sheet.rend())}, false, true});
+  const PatchMesh mesh = uniform_mesh(scene, 0.2);
+  const auto f = exact_form_factors<double>(mesh, scene, with_points(0, 1e-6));
+  EXPECT_GT(f.pairs_partial, 100u);
+  EXPECT_LT(f.closure_rms(), 1e-6);
+}
+
 TEST(ExactFormFactors, AgreeWithBruteForceRowByRow) {
   // Sums of |F_ij - brute force| over a row, so that errors cannot cancel. Brute force: 16 x 16
   // points of patch i, every polygon of the scene a blocker of its own, no planner, no solids. A

@@ -143,7 +143,9 @@ TEST(CurvedEnclosures, ConcentricSpheresAreWithinTheirBound) {
       std::printf("  r1/r2 %g  %s %-3s %.6f, exact %.6f, error %.1e, bound %.1e\n", ratio,
                   table.rows[rows[k]][1].substr(10, 20).c_str(), side == 0 ? "B1" : "B2", at(2)[0],
                   exact, std::abs(at(2)[0] - exact), bound);
-      EXPECT_LE(std::abs(at(2)[0] - exact), bound);
+      // What the kernels are off by on all grids alike is no part of a difference of grids.
+      constexpr double kKernels = 1e-7;  // of the radiosity: "The error bound", solver/README.md
+      EXPECT_LE(std::abs(at(2)[0] - exact), bound + kKernels * exact);
       EXPECT_LT(bound, 0.1 * exact) << "a bound so wide says nothing";
       ++compared;
     }
