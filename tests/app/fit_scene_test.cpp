@@ -74,7 +74,8 @@ TEST(FitSceneProgram, ExitsWithFiveAndNamesTheNullDirection) {
 }
 
 TEST(FitSceneProgram, EndsCleanlyAtCtrlCDuringFormFactors) {
-  // So many elements that form factors take far longer than the six seconds until SIGINT.
+  // So many elements that form factors take far longer than the six seconds until SIGINT. In the
+  // background timeout sends it to its group as well, and the second one ends the program.
   std::string path = measurement("");
   std::ifstream file(path);
   std::string text{std::istreambuf_iterator<char>(file), {}};
@@ -82,8 +83,8 @@ TEST(FitSceneProgram, EndsCleanlyAtCtrlCDuringFormFactors) {
   write_file_atomically(path, text);
   const std::string json = scratch_path("stopped.json"), directory = scratch_path("stopped");
   const CommandOutcome result =
-      run_command("timeout --preserve-status -s INT 6 '" TRUEBOX_PROGRAM "' fit " + path + " -o " +
-                  json + " --report " + directory);
+      run_command("timeout --foreground --preserve-status -s INT 6 '" TRUEBOX_PROGRAM "' fit " +
+                  path + " -o " + json + " --report " + directory);
   EXPECT_EQ(result.code, 5) << result.text;
   EXPECT_THAT(result.text, HasSubstr("stopped by the user before there was a fit"));
   EXPECT_FALSE(std::filesystem::exists(json));
