@@ -74,16 +74,16 @@ TEST(FitSceneProgram, ExitsWithFiveAndNamesTheNullDirection) {
 }
 
 TEST(FitSceneProgram, EndsCleanlyAtCtrlCDuringFormFactors) {
-  // So many elements that form factors take far longer than the six seconds until SIGINT. In the
+  // So many elements that form factors take far longer than the four seconds until SIGINT. In the
   // background timeout sends it to its group as well, and the second one ends the program.
   std::string path = measurement("");
   std::ifstream file(path);
   std::string text{std::istreambuf_iterator<char>(file), {}};
-  text.replace(text.find("elements = 400"), 14, "elements = 20000");
+  text.replace(text.find("elements = 400"), 14, "elements = 12000");
   write_file_atomically(path, text);
   const std::string json = scratch_path("stopped.json"), directory = scratch_path("stopped");
   const CommandOutcome result =
-      run_command("timeout --foreground --preserve-status -s INT 6 '" TRUEBOX_PROGRAM "' fit " +
+      run_command("timeout --foreground --preserve-status -s INT 4 '" TRUEBOX_PROGRAM "' fit " +
                   path + " -o " + json + " --report " + directory);
   EXPECT_EQ(result.code, 5) << result.text;
   EXPECT_THAT(result.text, HasSubstr("stopped by the user before there was a fit"));
