@@ -28,7 +28,7 @@ struct LaneShadow {
 
   alignas(64) Planes x, y, z, offset_m;
   int count = 0;
-  std::uint32_t hides_nothing = 0, hides_all = 0;  ///< bit l: from point l
+  std::uint32_t hides_all = 0;  ///< bit l: whatever the source, from point l
 
   /// False if the planes are too many. `normal`: of the patch of the points.
   bool make(const LanePoints& points, const Vec3& normal, const ConvexOccluder& solid,
