@@ -2,6 +2,7 @@
 #include "transport/exact_form_factors.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -16,6 +17,13 @@
 namespace truebox {
 namespace {
 
+// What one thread keeps from task to task.
+struct Worker {
+  explicit Worker(const ExactPairs& pairs) : view(pairs.view()) {}
+  ReceiverView view;
+  PairPlanner::Memory memory;
+};
+
 using PairList = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
 // Fills the lower half of the matrix, task by task.
@@ -28,11 +36,12 @@ class Filler {
       : pairs_(pairs), exchange_(exchange), partial_(pairs.planner().tasks()) {}
 
   void run() {
+    tbb::enumerable_thread_specific<Worker> workers([&] { return Worker(pairs_); });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, partial_.size(), 1),
                       [&](const auto& range) {
-                        ReceiverView view = pairs_.view();
+                        Worker& worker = workers.local();
                         for (std::size_t task = range.begin(); task < range.end(); ++task)
-                          fill(task, view);
+                          fill(task, worker);
                       });
     mirror();
   }
@@ -47,9 +56,10 @@ class Filler {
   }
 
  private:
-  void fill(std::size_t task, ReceiverView& view) {
+  void fill(std::size_t task, Worker& worker) {
     std::vector<PartialPair> open;
     std::vector<std::uint32_t> occluders_of_open;
+    ReceiverView& view = worker.view;
     std::size_t unoccluded = 0, hidden = 0;
     PairPlanner::Visitor visitor;
     std::vector<double> values;
@@ -72,7 +82,7 @@ class Filler {
       open.push_back(pair);
     };
     visitor.hidden = [&](std::size_t count) { hidden += count; };
-    pairs_.planner().visit(task, visitor);
+    pairs_.planner().visit(task, worker.memory, visitor);
     std::sort(open.begin(), open.end(), [](const PartialPair& a, const PartialPair& b) {
       return std::pair(a.receiver, a.source) < std::pair(b.receiver, b.source);
     });
@@ -175,8 +185,9 @@ void stream_form_factors(const PatchMesh& mesh, const Scene& scene,
                          const ExactFormFactorOptions& options, std::size_t begin, std::size_t end,
                          const std::function<void(const FormFactorRow& row)>& visit) {
   const ExactPairs pairs(mesh, scene, options);
+  tbb::enumerable_thread_specific<Worker> workers([&] { return Worker(pairs); });
   tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 4), [&](const auto& range) {
-    ReceiverView view = pairs.view();
+    auto& [view, memory] = workers.local();
     std::vector<double> values(mesh.size()), run;
     std::vector<std::uint32_t> partial;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
@@ -203,7 +214,7 @@ void stream_form_factors(const PatchMesh& mesh, const Scene& scene,
         else
           ++row.hidden;
       };
-      pairs.planner().visit_row(static_cast<std::uint32_t>(i), visitor);
+      pairs.planner().visit_row(static_cast<std::uint32_t>(i), memory, visitor);
       row.exchange_area_m2 = values;
       row.partial = partial;
       visit(row);

@@ -59,7 +59,8 @@ FlatSource::FlatSource(const PlanarPolygon& polygon) {
   const Polygon& p = polygon.vertices;
   u = (p[1] - p[0]).normalized();
   v = polygon.plane.normal.cross(u);
-  for (std::size_t k = 0; k < 4; ++k) {
+  corners = p.size() <= 4 ? 4 : kMostCorners;
+  for (std::size_t k = 0; k < kMostCorners; ++k) {
     const Vec3 corner = p[std::min(k, p.size() - 1)] - polygon.centroid;
     corner_u[k] = corner.dot(u);
     corner_v[k] = corner.dot(v);

@@ -35,12 +35,18 @@ struct LaneShadow {
             double tolerance_m);
 };
 
-/// A triangle or quad in its own plane, coordinates about its centroid; a triangle repeats a corner.
+/// A polygon of up to eight corners in its own plane, coordinates about its centroid. The last
+/// corner is repeated: a triangle has four, a pentagon eight.
 struct FlatSource {
-  Vec3 u, v;  ///< axes, unit
-  std::array<double, 4> corner_u, corner_v;
+  static constexpr std::size_t kMostCorners = 8;
 
-  static bool fits(const PlanarPolygon& polygon) { return polygon.vertices.size() <= 4; }
+  Vec3 u, v;  ///< axes, unit
+  std::array<double, kMostCorners> corner_u, corner_v;
+  std::size_t corners = 4;  ///< or kMostCorners
+
+  static bool fits(const PlanarPolygon& polygon) {
+    return polygon.vertices.size() <= kMostCorners;
+  }
   explicit FlatSource(const PlanarPolygon& polygon);
 };
 

@@ -51,7 +51,7 @@ constexpr double kSameLine = 1e-9;  // of its radius: lines closer than this cou
 struct Cut {
   Eight along_u, along_v, height;
   Eight slope;  // of the height, within a factor sqrt 2
-  std::array<Eight, 4> corner, root;
+  std::array<Eight, FlatSource::kMostCorners> corner, root;
 };
 
 // Twice the area, and six times its first moments.
@@ -71,10 +71,11 @@ struct Cuts {
 };
 
 // The source's edges as far as they lie behind all cuts.
+template <std::size_t kCorners>
 [[gnu::always_inline]] inline void add_edges(const FlatSource& s, const Cut* first,
                                              const Cut* last, Region& region) {
-  for (std::size_t k = 0; k < 4; ++k) {
-    const std::size_t next = (k + 1) % 4;
+  for (std::size_t k = 0; k < kCorners; ++k) {
+    const std::size_t next = (k + 1) % kCorners;
     const double eu = s.corner_u[next] - s.corner_u[k], ev = s.corner_v[next] - s.corner_v[k];
     Eight low = {}, high = low + 1.0;
     for (const Cut* cut = first; cut != last; ++cut)
@@ -87,12 +88,13 @@ struct Cuts {
 
 // The cuts' own lines as far as they lie in the source and behind the other cuts. Of two equal
 // lines the first counts.
+template <std::size_t kCorners>
 [[gnu::always_inline]] inline void add_lines(const FlatSource& s, double same_m, const Cut* first,
                                              const Cut* last, Region& region) {
   for (const Cut* cut = first; cut != last; ++cut) {
     Eight from_u = {}, from_v = {}, to_u = {}, to_v = {}, low = {}, high = {};
-    for (std::size_t k = 0; k < 4; ++k) {
-      const std::size_t next = (k + 1) % 4;
+    for (std::size_t k = 0; k < kCorners; ++k) {
+      const std::size_t next = (k + 1) % kCorners;
       const Eight &a = cut->corner[k], &b = cut->corner[next];
       const Eight u = s.corner_u[k] + cut->root[k] * (s.corner_u[next] - s.corner_u[k]);
       const Eight v = s.corner_v[k] + cut->root[k] * (s.corner_v[next] - s.corner_v[k]);
@@ -166,11 +168,12 @@ struct View {
   return true;
 }
 
+template <std::size_t kCorners>
 [[gnu::always_inline]] inline void measure(const FlatSource& flat, Cut& cut) {
-  for (std::size_t k = 0; k < 4; ++k)
+  for (std::size_t k = 0; k < kCorners; ++k)
     cut.corner[k] = cut.along_u * flat.corner_u[k] + cut.along_v * flat.corner_v[k] + cut.height;
-  for (std::size_t k = 0; k < 4; ++k)
-    cut.root[k] = cut.corner[k] / (cut.corner[k] - cut.corner[(k + 1) % 4]);
+  for (std::size_t k = 0; k < kCorners; ++k)
+    cut.root[k] = cut.corner[k] / (cut.corner[k] - cut.corner[(k + 1) % kCorners]);
 }
 
 [[gnu::always_inline]] inline View view_of(const LanePoints& points, const Vec3& normal,
@@ -190,13 +193,29 @@ struct View {
   return view;
 }
 
+template <std::size_t kCorners>
 [[gnu::always_inline]] inline Eight share_behind(const FlatSource& flat, double same_m,
                                                  const View& view, const Cut* first,
                                                  const Cut* last) {
   Region region;
-  add_edges(flat, first, last, region);
-  add_lines(flat, same_m, first, last, region);
+  add_edges<kCorners>(flat, first, last, region);
+  add_lines<kCorners>(flat, same_m, first, last, region);
   return view.share(region);
+}
+
+// Of the union of at most two shadows, whose cuts begin at `begin`.
+template <std::size_t kCorners>
+[[gnu::always_inline]] inline Eight share_in_shadow(const FlatSource& flat, double same_m,
+                                                    const View& view, Cuts& cuts,
+                                                    const std::array<int, 3>& begin, int active) {
+  for (int k = 0; k < cuts.count; ++k) measure<kCorners>(flat, cuts.cut[static_cast<std::size_t>(k)]);
+  const Cut* const first = cuts.cut.data();
+  Eight hidden = {};
+  for (std::size_t k = 0; k < static_cast<std::size_t>(active); ++k)
+    hidden += share_behind<kCorners>(flat, same_m, view, first + begin[k], first + begin[k + 1]);
+  if (active == 2)
+    hidden -= share_behind<kCorners>(flat, same_m, view, first, first + begin[2]);
+  return hidden;
 }
 
 bool hidden_shares(const LanePoints& points, const Vec3& normal, const PlanarPolygon& source,
@@ -223,14 +242,11 @@ bool hidden_shares(const LanePoints& points, const Vec3& normal, const PlanarPol
     if (active == 2) return false;
     begin[static_cast<std::size_t>(++active)] = cuts.count;
   }
-  for (int k = 0; k < cuts.count; ++k) measure(flat, cuts.cut[static_cast<std::size_t>(k)]);
   const double same_m = kSameLine * source.radius_m;
-  const Cut* const first = cuts.cut.data();
-  Eight hidden = {};
-  for (std::size_t k = 0; k < static_cast<std::size_t>(active); ++k)
-    hidden += share_behind(flat, same_m, view, first + begin[k], first + begin[k + 1]);
-  if (active == 2)
-    hidden -= share_behind(flat, same_m, view, first, first + begin[2]);
+  Eight hidden = flat.corners == 4
+                     ? share_in_shadow<4>(flat, same_m, view, cuts, begin, active)
+                     : share_in_shadow<FlatSource::kMostCorners>(flat, same_m, view, cuts, begin,
+                                                                 active);
   const Eight one = Eight{} + 1.0;
   hidden = smaller(larger(hidden, Eight{}), one);
   store(shares.hidden, hidden > 1.0 - kNothing ? one : hidden);
