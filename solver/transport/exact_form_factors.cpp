@@ -199,7 +199,8 @@ void stream_form_factors(const PatchMesh& mesh, const Scene& scene,
       visitor.hidden = [&](std::size_t count) { row.hidden += count; };
       visitor.unoccluded = [&](auto of_i, auto of_j, bool face_wholly) {
         run.resize(of_j.size());
-        pairs.kernel().exchange_areas_m2(of_i[0], pairs.planner().position_of(of_j), face_wholly, run);
+        pairs.kernel().exchange_areas_m2(of_i[0], pairs.planner().position_of(of_j), face_wholly,
+                                         run);
         for (std::size_t k = 0; k < run.size(); ++k) {
           values[of_j[k]] = run[k];
           row.unoccluded += run[k] > 0.0;

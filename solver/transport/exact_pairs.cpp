@@ -158,8 +158,7 @@ double ExactPairs::adaptive_exchange_m2(const PartialPair& pair,
   return visible_exchange(receiver, source, members_of(occluders), options).exchange_area_m2;
 }
 
-std::vector<const Blocker*> ExactPairs::members_of(
-    std::span<const std::uint32_t> occluders) const {
+std::vector<const Blocker*> ExactPairs::members_of(std::span<const std::uint32_t> occluders) const {
   std::vector<const Blocker*> blockers;
   for (std::uint32_t id : occluders)
     for (std::uint32_t member : planner_.occluders()[id].members)
@@ -254,8 +253,7 @@ double ExactPairs::share_from(std::uint32_t k, double factor, bool near, const P
     if (hidden >= 0.0) return 1.0 - hidden;
   }
   if (fits && view.parts.cut(source.vertices, {across.data(), count})) {
-    if (!near)
-      return 1.0 - view.parts.hidden_share(x, receiver.plane.normal, source.plane.normal);
+    if (!near) return 1.0 - view.parts.hidden_share(x, receiver.plane.normal, source.plane.normal);
     return factor > 0.0 ? view.parts.visible_factor(x, receiver.plane.normal) / factor : 0.0;
   }
   double seen = 0.0;

@@ -257,8 +257,8 @@ class Integrator {
     cell.rougher_in_u = in_u > in_v;
     if (in_u == 0.0 && in_v == 0.0) {
       const auto& q = cell.corners;
-      cell.rougher_in_u = (q[1] + q[2] - q[0] - q[3]).squaredNorm() >
-                          (q[2] + q[3] - q[0] - q[1]).squaredNorm();
+      cell.rougher_in_u =
+          (q[1] + q[2] - q[0] - q[3]).squaredNorm() > (q[2] + q[3] - q[0] - q[1]).squaredNorm();
       look_at_corners(cell);
     }
   }

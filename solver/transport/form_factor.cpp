@@ -188,7 +188,8 @@ double contour_m2(const PlanarPolygon& receiver, const PlanarPolygon& source, do
 constexpr double kRounding = 20.0 * std::numeric_limits<double>::epsilon();
 constexpr double kDigitsAskedFor = 1e-6;  // rougher answers do not mind that contours cancel
 constexpr double kCancels = 1e-11;
-constexpr double kGrazing = 0.1;  // relative height below which one plane is nearly shared
+constexpr double kGrazing =
+    0.1;  // relative height, and sine of the tilt, of one plane nearly shared
 
 // Both polygons wholly in front of each other. The smaller one receives.
 double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tolerance,
@@ -200,11 +201,13 @@ double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tole
   if (tolerance > kDigitsAskedFor) return contour_m2(receiver, source, tolerance, magnitude);
   double terms = 0.0;
   double result = contour_m2(receiver, source, tolerance, &terms);
-  if (kRounding * terms > kCancels * result) {
+  if (kRounding * terms > kCancels * result && i.plane.normal.dot(j.plane.normal) > 0.0 &&
+      i.plane.normal.cross(j.plane.normal).norm() < kGrazing) {
     const double height = relative_height(i, j);
     if (height > 0.0 && height < kGrazing) {
-      result = grazing_exchange_m2(receiver, source, tolerance);
-      terms = result / height;
+      constexpr double kTolerance = 1e-12;
+      result = grazing_exchange_m2(receiver, source, std::max(tolerance, kTolerance));
+      terms = result * (1.0 / height + kTolerance / kRounding);
     }
   }
   if (magnitude) *magnitude += terms;

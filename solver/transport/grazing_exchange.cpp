@@ -11,7 +11,7 @@
 namespace truebox {
 namespace {
 
-constexpr int kDeepest = 30;  // a cell of 4^-30 of the receiver is nothing
+constexpr int kDeepest = 20;  // a cell of 4^-20 of the receiver is nothing
 constexpr int kRough = 5, kFine = 8;
 
 // A bilinear quad of the receiver; a triangle repeats a corner.
@@ -73,8 +73,7 @@ class Integrator {
 
 double highest_m(const PlanarPolygon& polygon, const Plane& plane) {
   double highest = 0.0;
-  for (const Vec3& v : polygon.vertices)
-    highest = std::max(highest, std::abs(plane.distance_m(v)));
+  for (const Vec3& v : polygon.vertices) highest = std::max(highest, std::abs(plane.distance_m(v)));
   return highest;
 }
 

@@ -17,7 +17,7 @@ double grazing_factor(const Vec3& point, const Vec3& normal, const PlanarPolygon
 
 /// Exchange area (m^2) of two convex polygons wholly in front of each other that nearly share a
 /// plane: grazing_factor integrated over the receiver, cells cut in four where two Gauss rules
-/// differ (touching corners, mostly), to a relative tolerance of 1e-13 to 1e-2.
+/// differ (touching corners, mostly), to a relative tolerance of 1e-12 to 1e-2.
 double grazing_exchange_m2(const PlanarPolygon& receiver, const PlanarPolygon& source,
                            double relative_tolerance);
 

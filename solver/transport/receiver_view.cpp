@@ -62,8 +62,8 @@ std::span<const ReceiverView::Lanes> ReceiverView::lane_shadows(std::uint32_t oc
   if (std::exchange(entry.age, age_) == age_) return entry.shadows;
   entry.shadows.resize(rule().lanes.size());
   for (std::size_t k = 0; k < entry.shadows.size(); ++k)
-    entry.shadows[k].fits = entry.shadows[k].shadow.make(
-        rule().lanes[k], receiver_->plane.normal, occluders_[occluder], tolerance_m_);
+    entry.shadows[k].fits = entry.shadows[k].shadow.make(rule().lanes[k], receiver_->plane.normal,
+                                                         occluders_[occluder], tolerance_m_);
   return entry.shadows;
 }
 

@@ -60,7 +60,7 @@ class ReceiverView {
     PatchPointBuffer buffer;
     PatchPoints points{};
     std::vector<LanePoints> lanes;
-    std::vector<Entry<Shadow>> shadows;    // of each occluder
+    std::vector<Entry<Shadow>> shadows;  // of each occluder
     std::vector<Entry<Lanes>> by_lanes;
   };
 

@@ -44,9 +44,7 @@ struct FlatSource {
   std::array<double, kMostCorners> corner_u, corner_v;
   std::size_t corners = 4;  ///< or kMostCorners
 
-  static bool fits(const PlanarPolygon& polygon) {
-    return polygon.vertices.size() <= kMostCorners;
-  }
+  static bool fits(const PlanarPolygon& polygon) { return polygon.vertices.size() <= kMostCorners; }
   explicit FlatSource(const PlanarPolygon& polygon);
 };
 

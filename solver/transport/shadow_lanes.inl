@@ -6,7 +6,7 @@
 // machine finds the same bits (-ffp-contract=off).
 using Eight [[gnu::vector_size(64)]] = double;
 
-constexpr int kMostCuts = 12;       // of one shadow that reach the source
+constexpr int kMostCuts = 16;       // of one shadow that reach the source: all that a box has
 constexpr double kNothing = 1e-12;  // of the source's area: rounding
 constexpr double kSameLine = 1e-9;  // of its radius: lines closer than this count once
 
@@ -72,8 +72,8 @@ struct Cuts {
 
 // The source's edges as far as they lie behind all cuts.
 template <std::size_t kCorners>
-[[gnu::always_inline]] inline void add_edges(const FlatSource& s, const Cut* first,
-                                             const Cut* last, Region& region) {
+[[gnu::always_inline]] inline void add_edges(const FlatSource& s, const Cut* first, const Cut* last,
+                                             Region& region) {
   for (std::size_t k = 0; k < kCorners; ++k) {
     const std::size_t next = (k + 1) % kCorners;
     const double eu = s.corner_u[next] - s.corner_u[k], ev = s.corner_v[next] - s.corner_v[k];
@@ -122,10 +122,10 @@ template <std::size_t kCorners>
 
 // What all lanes need of the source.
 struct View {
-  Eight rx, ry, rz;      // from the points to the centroid
-  Eight r2, cosine;      // of these: length squared, times the receiver's cosine
-  Eight ru, rv;          // along the source's axes
-  double nu, nv;         // the receiver's normal along them
+  Eight rx, ry, rz;  // from the points to the centroid
+  Eight r2, cosine;  // of these: length squared, times the receiver's cosine
+  Eight ru, rv;      // along the source's axes
+  double nu, nv;     // the receiver's normal along them
   double whole_twice_m2;
 
   // Of the whole kernel, the region's: its area and the kernel at its centroid.
@@ -135,8 +135,8 @@ struct View {
     const Eight u = region.u * third, v = region.v * third;
     const Eight at2 = r2 + 2.0 * (u * ru + v * rv) + u * u + v * v;
     const Eight ratio = r2 / at2;
-    const Eight share = region.twice / whole_twice_m2 * (1.0 + (u * nu + v * nv) / cosine) *
-                        (ratio * ratio);
+    const Eight share =
+        region.twice / whole_twice_m2 * (1.0 + (u * nu + v * nv) / cosine) * (ratio * ratio);
     const Eight within = smaller(larger(share, Eight{}), Eight{} + 1.0);
     return region.twice > least_m2 ? within : Eight{};
   }
@@ -145,8 +145,7 @@ struct View {
 // Adds the cuts of one shadow that reach the source. False if they are too many; `reaches`: from
 // some point it may hide something.
 [[gnu::always_inline]] inline bool find_cuts(const LaneShadow& shadow, const PlanarPolygon& source,
-                                             const FlatSource& flat, Cuts& cuts,
-                                             bool& reaches) {
+                                             const FlatSource& flat, Cuts& cuts, bool& reaches) {
   const Vec3& c = source.centroid;
   const double radius_m = source.radius_m;
   const int before = cuts.count;
@@ -208,13 +207,13 @@ template <std::size_t kCorners>
 [[gnu::always_inline]] inline Eight share_in_shadow(const FlatSource& flat, double same_m,
                                                     const View& view, Cuts& cuts,
                                                     const std::array<int, 3>& begin, int active) {
-  for (int k = 0; k < cuts.count; ++k) measure<kCorners>(flat, cuts.cut[static_cast<std::size_t>(k)]);
+  for (int k = 0; k < cuts.count; ++k)
+    measure<kCorners>(flat, cuts.cut[static_cast<std::size_t>(k)]);
   const Cut* const first = cuts.cut.data();
   Eight hidden = {};
   for (std::size_t k = 0; k < static_cast<std::size_t>(active); ++k)
     hidden += share_behind<kCorners>(flat, same_m, view, first + begin[k], first + begin[k + 1]);
-  if (active == 2)
-    hidden -= share_behind<kCorners>(flat, same_m, view, first, first + begin[2]);
+  if (active == 2) hidden -= share_behind<kCorners>(flat, same_m, view, first, first + begin[2]);
   return hidden;
 }
 
@@ -224,8 +223,7 @@ bool hidden_shares(const LanePoints& points, const Vec3& normal, const PlanarPol
   const View view = view_of(points, normal, source, flat);
   const Vec3& m = source.plane.normal;
   const Eight cosine = -(view.rx * m.x() + view.ry * m.y() + view.rz * m.z());
-  store(shares.kernel_m2,
-        load(points.weight_m2) * view.cosine * cosine / (view.r2 * view.r2));
+  store(shares.kernel_m2, load(points.weight_m2) * view.cosine * cosine / (view.r2 * view.r2));
   Cuts cuts;
   std::array<int, 3> begin{};
   int active = 0;
@@ -243,10 +241,9 @@ bool hidden_shares(const LanePoints& points, const Vec3& normal, const PlanarPol
     begin[static_cast<std::size_t>(++active)] = cuts.count;
   }
   const double same_m = kSameLine * source.radius_m;
-  Eight hidden = flat.corners == 4
-                     ? share_in_shadow<4>(flat, same_m, view, cuts, begin, active)
-                     : share_in_shadow<FlatSource::kMostCorners>(flat, same_m, view, cuts, begin,
-                                                                 active);
+  Eight hidden = flat.corners == 4 ? share_in_shadow<4>(flat, same_m, view, cuts, begin, active)
+                                   : share_in_shadow<FlatSource::kMostCorners>(flat, same_m, view,
+                                                                               cuts, begin, active);
   const Eight one = Eight{} + 1.0;
   hidden = smaller(larger(hidden, Eight{}), one);
   store(shares.hidden, hidden > 1.0 - kNothing ? one : hidden);

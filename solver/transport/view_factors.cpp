@@ -53,8 +53,7 @@ VisibleExchange exchange_behind(const PlanarPolygon& i, const PlanarPolygon& j,
                                 std::span<const Blocker* const> faces,
                                 const ExactVisibilityOptions& options) {
   const bool j_receives = j.radius_m < i.radius_m;
-  if (const auto seen =
-          visible_exchange(j_receives ? j : i, j_receives ? i : j, solids, options))
+  if (const auto seen = visible_exchange(j_receives ? j : i, j_receives ? i : j, solids, options))
     return *seen;
   return visible_exchange(i, j, faces, options);
 }
@@ -63,8 +62,8 @@ ViewFactorEstimate from_exact_visibility(const PlanarPolygon& i, const PlanarPol
                                          std::span<const ConvexOccluder* const> solids,
                                          std::span<const Blocker* const> faces,
                                          const ViewFactorOptions& options) {
-  const auto seen = exchange_behind(i, j, solids, faces,
-                                    {options.relative_tolerance, options.most_evaluations});
+  const auto seen =
+      exchange_behind(i, j, solids, faces, {options.relative_tolerance, options.most_evaluations});
   ViewFactorEstimate result;
   result.method = ViewFactorMethod::exact_visibility;
   result.exchange_area_m2 = seen.exchange_area_m2;

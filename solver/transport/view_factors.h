@@ -58,8 +58,9 @@ struct ViewFactorEstimate {
 ///   A_i F_ij = 1/pi integral_i integral_j V cos_i cos_j / r^2 dA_j dA_i.
 /// Surfaces may be concave, have holes, be bent or two-sided: they are sums over convex pieces, and
 /// a surface may see itself. Openings are seen but do not block; blocks hide as convex solids
-/// (convex_occluder) where exact visibility is found, polygon by polygon elsewhere. Coordinates are shifted to the
-/// scene's centre first, so a far origin costs no digits beyond those of the file's own numbers.
+/// (convex_occluder) where exact visibility is found, polygon by polygon elsewhere. Coordinates are
+/// shifted to the scene's centre first, so a far origin costs no digits beyond those of the file's
+/// own numbers.
 class ViewFactors {
  public:
   explicit ViewFactors(const Scene& scene);
@@ -91,7 +92,7 @@ class ViewFactors {
   bool find_between(std::uint32_t p, std::uint32_t q, Between& between) const;
 
   std::vector<Piece> pieces_;
-  std::vector<ConvexOccluder> solids_;        // members are pieces
+  std::vector<ConvexOccluder> solids_;  // members are pieces
   std::vector<std::uint32_t> solid_of_piece_;
   std::vector<std::vector<std::uint32_t>> pieces_of_;  // of each surface
   std::vector<double> area_m2_;

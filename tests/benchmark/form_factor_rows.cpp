@@ -7,10 +7,9 @@
 
 #include "benchmark.h"
 #include "scene/scene_file.h"
+#include "support/brute_force_rows.h"
 #include "transport/enclosure.h"
 #include "transport/exact_form_factors.h"
-#include "transport/pair_kernel.h"
-#include "transport/visible_parts.h"
 
 namespace truebox::benchmark {
 namespace {
@@ -25,32 +24,6 @@ std::size_t resident_bytes_at_most() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<std::size_t>(usage.ru_maxrss) * 1024;
-}
-
-// sum_j |F_ij - what 16 x 16 points of patch i see|: no planner, no solids, no kernel, and errors
-// cannot cancel.
-double row_difference(const std::vector<PlanarPolygon>& patches, const PatchMesh& mesh,
-                      const Eigen::MatrixXd& exchange_area_m2, std::uint32_t i) {
-  std::vector<Blocker> pieces;
-  std::vector<const Blocker*> blockers;
-  for (const Piece& piece : mesh.pieces) pieces.push_back({piece.polygon, piece.plane});
-  for (std::size_t p = 0; p < pieces.size(); ++p)
-    if (p != mesh.patches[i].piece) blockers.push_back(&pieces[p]);
-  PatchPointBuffer buffer;
-  const PatchPoints points = buffer.fill(patches[i], 16);
-  VisibleParts parts;
-  double sum = 0.0;
-  for (std::size_t j = 0; j < patches.size(); ++j) {
-    if (mesh.patches[j].piece == mesh.patches[i].piece) continue;
-    double seen_m2 = 0.0;
-    for (std::uint32_t k = 0; k < points.count; ++k)
-      for (const Polygon& part :
-           parts(points.at(k), patches[j].vertices, patches[j].plane, blockers))
-        seen_m2 +=
-            points.weight_at(k) * point_to_polygon(points.at(k), patches[i].plane.normal, part);
-    sum += std::abs(exchange_area_m2(static_cast<Eigen::Index>(j), i) - seen_m2);
-  }
-  return sum / patches[i].area_m2;
 }
 
 }  // namespace
@@ -101,7 +74,7 @@ FormFactorRows measure_form_factor_rows(const std::filesystem::path& reference_d
     auto i = static_cast<std::uint32_t>((k + 0.5) * n / rows_compared);
     while (factors.exchange_area_m2.col(i).sum() < 0.5 * factors.area_m2[i]) ++i;
     result.row_difference =
-        std::max(result.row_difference, row_difference(patches, mesh, factors.exchange_area_m2, i));
+        std::max(result.row_difference, row_difference(mesh, patches, factors.exchange_area_m2, i));
   }
   return result;
 }

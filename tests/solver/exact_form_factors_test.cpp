@@ -7,14 +7,18 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <numbers>
 #include <numeric>
 #include <random>
 #include <stdexcept>
 
 #include "radiometry/table_file.h"
+#include "scene/scene_file.h"
+#include "support/brute_force_rows.h"
 #include "support/tiny_scenes.h"
 #include "transport/pair_kernel.h"
 #include "transport/shadow_cones.h"
+#include "transport/shadow_lanes.h"
 
 namespace truebox {
 namespace {
@@ -67,40 +71,43 @@ TEST(ExactFormFactors, SeeBothSidesOfASheetHide) {
 }
 
 TEST(ExactFormFactors, AgreeWithBruteForceRowByRow) {
-  // Sums of |F_ij - brute force| over a row, so that errors cannot cancel. Brute force: 16 x 16
-  // points of patch i, every polygon of the scene a blocker of its own, no planner, no solids. A
-  // shadow's edge across a patch is found to some 1/16^1.5 of what crosses it, and a tenth of the
-  // row is partly hidden: 2e-3. Nine points a pair are worse by (16/3)^1.5 at most.
+  // Brute force finds a shadow's edge to some 1/16^1.5, and a tenth of the row is partly hidden:
+  // 2e-3. Nine points a pair are worse by (16/3)^1.5 at most.
   const Scene scene = tiny::cube_with_block(1.0, 0.0);
   const PatchMesh mesh = uniform_mesh(scene, 0.25);
   const std::vector<PlanarPolygon> patches = planar_polygons(mesh);
-  std::vector<Blocker> pieces;
-  for (const Piece& piece : mesh.pieces) pieces.push_back({piece.polygon, piece.plane});
   const auto adaptive = exact_form_factors<double>(mesh, scene, with_points(0, 1e-6));
   const auto quick = exact_form_factors<double>(mesh, scene, with_points(3));
-  VisibleParts parts;
-  PatchPointBuffer buffer;
   for (std::uint32_t i : {0u, 9u, 40u, 77u, 90u}) {
-    std::vector<const Blocker*> blockers;
-    for (std::size_t p = 0; p < pieces.size(); ++p)
-      if (p != mesh.patches[i].piece) blockers.push_back(&pieces[p]);
-    const PatchPoints points = buffer.fill(patches[i], 16);
-    double adaptive_off = 0.0, quick_off = 0.0;
-    for (std::size_t j = 0; j < patches.size(); ++j) {
-      if (mesh.patches[j].piece == mesh.patches[i].piece) continue;
-      double seen_m2 = 0.0;
-      for (std::uint32_t k = 0; k < points.count; ++k)
-        for (const Polygon& part :
-             parts(points.at(k), patches[j].vertices, patches[j].plane, blockers))
-          seen_m2 +=
-              points.weight_at(k) * point_to_polygon(points.at(k), patches[i].plane.normal, part);
-      const auto at = static_cast<Eigen::Index>(j);
-      adaptive_off += std::abs(adaptive.exchange_area_m2(at, i) - seen_m2);
-      quick_off += std::abs(quick.exchange_area_m2(at, i) - seen_m2);
-    }
-    EXPECT_LT(adaptive_off, 2e-3 * patches[i].area_m2) << i;
-    EXPECT_LT(quick_off, 2e-2 * patches[i].area_m2) << i;
+    EXPECT_LT(row_difference(mesh, patches, adaptive.exchange_area_m2, i), 2e-3) << i;
+    EXPECT_LT(row_difference(mesh, patches, quick.exchange_area_m2, i), 2e-2) << i;
   }
+}
+
+TEST(ExactFormFactors, CloseTheRoomWithTwoBlocksToABillionth) {
+  // The closed box cut into 223 patches: rows must sum to 1 to the tolerance asked for, whichever
+  // blocks meet in front of each other. A row has some 100 partly hidden pairs, each allowed a
+  // tenth of the tolerance: ten times the tolerance at most.
+  const Scene scene =
+      read_scene(std::string(TRUEBOX_REFERENCE_DIR) + "/independent_renders/closed_box.toml");
+  const PatchMesh mesh = uniform_mesh(scene, edge_for_count(scene, 200));
+  std::vector<double> off;
+  std::mutex lock;
+  // Rows of the floor between the blocks and of the wall behind them.
+  for (std::size_t begin : {32u, 157u})
+    stream_form_factors(
+        mesh, scene, with_points(0, 1e-9), begin, begin + 6, [&](const FormFactorRow& row) {
+          const std::lock_guard guard(lock);
+          const double sum =
+              std::accumulate(row.exchange_area_m2.begin(), row.exchange_area_m2.end(), 0.0) /
+              mesh.patches[row.patch].area_m2;
+          if (sum > 1e-4) off.push_back(std::abs(sum - 1.0));  // not buried
+        });
+  ASSERT_GE(off.size(), 8u);
+  double squares = 0.0;
+  for (double error : off) squares += error * error;
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(off.size())), 1e-9);
+  EXPECT_LT(*std::max_element(off.begin(), off.end()), 1e-8);
 }
 
 TEST(ExactFormFactors, FloatsCostTheirRounding) {
@@ -317,6 +324,91 @@ TEST(ShadowCones, AgreeWithExactPartsFarAway) {
     partly += exact > 0.01 && exact < 0.99;
   }
   EXPECT_GT(partly, 50);
+}
+
+// Eight points of a square at the origin, looking up.
+LanePoints eight_points(double edge) {
+  LanePoints points{};
+  for (std::size_t l = 0; l < kShadowLanes; ++l) {
+    points.x[l] = edge * static_cast<double>(l % 4) / 3.0;
+    points.y[l] = edge * static_cast<double>(l / 4);
+    points.weight_m2[l] = edge * edge / 8.0;
+  }
+  return points;
+}
+
+class ShadowLanes : public testing::TestWithParam<int> {};  // corners of the source
+
+TEST_P(ShadowLanes, HideWhatExactPartsDo) {
+  // Behind one block or two that overlap, point by point, against the polygons that cones cut. Both
+  // take kernels at centroids, one of hidden parts, the other of their pieces: equal to second
+  // order in size over distance, (0.25 / 2)^2 / 2.
+  const int corners = GetParam();
+  Polygon polygon;
+  for (int k = 0; k < corners; ++k) {
+    const double phi = -2.0 * std::numbers::pi * k / corners;
+    polygon.push_back({0.12 * std::cos(phi), 0.12 * std::sin(phi), 2.0});
+  }
+  const PlanarPolygon source(polygon);
+  ASSERT_TRUE(FlatSource::fits(source));
+  const FlatSource flat(source);
+  const LanePoints points = eight_points(0.1);
+  const Vec3 normal = Vec3::UnitZ();
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> uniform(-0.15, 0.15);
+  ShadowParts parts;
+  int partly = 0, dark = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    std::vector<ConvexOccluder> solids;
+    std::vector<LaneShadow> lanes(1 + trial % 2);
+    for (std::size_t k = 0; k < lanes.size(); ++k) {
+      const Vec3 low(uniform(random), uniform(random), 0.7 + uniform(random));
+      const Vec3 size = Vec3(0.16, 0.16, 0.3) + Vec3(uniform(random), uniform(random), 0.0);
+      solids.push_back(convex_occluders(box_faces(low, low + size), 1e-12)[0]);
+      ASSERT_TRUE(lanes[k].make(points, normal, solids[k], 1e-12));
+    }
+    std::vector<const LaneShadow*> shadows;
+    for (const LaneShadow& shadow : lanes) shadows.push_back(&shadow);
+    LaneShares found;
+    ASSERT_TRUE(hidden_shares(points, normal, source, flat, shadows, found));
+    for (std::size_t l = 0; l < kShadowLanes; ++l) {
+      const Vec3 x(points.x[l], points.y[l], points.z[l]);
+      std::vector<ShadowCone> cones(solids.size());
+      std::vector<const ShadowCone*> active;
+      for (std::size_t k = 0; k < solids.size(); ++k)
+        if (ShadowCone::make(x, normal, solids[k], 1e-12, cones[k]) == ShadowCone::Hides::region)
+          active.push_back(&cones[k]);
+      ASSERT_TRUE(parts.cut(source.vertices, active));
+      const double exact = parts.hidden_share(x, normal, source.plane.normal);
+      EXPECT_NEAR(found.hidden[l], exact, 0.008) << trial << ' ' << l;
+      EXPECT_EQ(found.hidden[l] == 0.0, exact < 1e-12) << trial << ' ' << l << ' ' << exact;
+      partly += exact > 0.01 && exact < 0.99;
+      dark += exact == 1.0;
+    }
+  }
+  EXPECT_GT(partly, 300);
+  EXPECT_GT(dark, 20);
+}
+
+INSTANTIATE_TEST_SUITE_P(Corners, ShadowLanes, testing::Values(3, 4, 5, 8));
+
+TEST(ShadowLanes, CountLinesThatCoincideOnce) {
+  // A patch under a block, cut along its foot: on the floor the outline of the block and the planes
+  // of its faces are the same lines, the patch's own edge.
+  const auto block = convex_occluders(box_faces({0.0, 0.0, 0.0}, {0.2, 0.2, 0.3}), 1e-12);
+  const PlanarPolygon under(Polygon{{0, 0, 0}, {0.1, 0, 0}, {0.1, 0.1, 0}, {0, 0.1, 0}});
+  LanePoints points{};
+  for (std::size_t l = 0; l < kShadowLanes; ++l) {
+    points.x[l] = -1.0;
+    points.y[l] = -1.0 + 0.2 * static_cast<double>(l);
+    points.z[l] = 0.9;
+  }
+  LaneShadow shadow;
+  const LaneShadow* const shadows[] = {&shadow};
+  LaneShares found;
+  ASSERT_TRUE(shadow.make(points, Vec3::UnitX(), block[0], 1e-9));
+  ASSERT_TRUE(hidden_shares(points, Vec3::UnitX(), under, FlatSource(under), shadows, found));
+  for (double hidden : found.hidden) EXPECT_NEAR(hidden, 1.0, 1e-6);
 }
 
 // A closed cube's factors with multiplicative noise, and its radiosity.
