@@ -51,7 +51,7 @@ class BehindPolygons {
   std::vector<Polygon> cells() const {
     return cells_between_events(receiver_, source_, blockers_, kMostCells);
   }
-  bool may_cross() const { return blockers_.size() > 1; }
+  bool may_cross() const { return blockers_.size() > 1 && arcs_ == 0; }  // chords err by more
   double visible(const Vec3& point) { return factor_sum(point, split(point)); }
   double hidden(const Vec3& point) {
     split(point);

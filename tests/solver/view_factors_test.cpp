@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <random>
 
 #include "support/tiny_scenes.h"
@@ -179,6 +180,19 @@ TEST(Planner, TakesTheCheapestThatIsExact) {
   EXPECT_EQ(method_of(squares_with_blocker({-0.5, -0.5, 0.5}, 2.0)), ViewFactorMethod::hidden);
   EXPECT_EQ(method_of(squares_with_blocker({0.2, 0.2, 0.5}, 0.5)),
             ViewFactorMethod::exact_visibility);
+}
+
+TEST(Planner, TakesABlockForOneSolid) {
+  // A block stands on its edge between two small squares: each of the two faces that look at one of
+  // them hides half of the other, together all.
+  Scene scene = tiny::grey_scene(0.0);
+  tiny::add_surface(scene, "left", square(0.2, {-2.0, -0.1, -0.1}, kY, kZ));
+  tiny::add_surface(scene, "right", square(0.2, {2.0, -0.1, -0.1}, kZ, kY));
+  tiny::add_box(scene, "block", {-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}, false);
+  const Eigen::Matrix3d on_edge = Eigen::AngleAxisd(0.25 * std::numbers::pi, kZ).toRotationMatrix();
+  for (std::size_t s = 2; s < scene.surfaces.size(); ++s)
+    for (Vec3& v : scene.surfaces[s].pieces[0]) v = on_edge * v;
+  EXPECT_EQ(ViewFactors(scene).between(0, 1, {}).method, ViewFactorMethod::hidden);
 }
 
 TEST(ExactVisibility, ReachesTheToleranceAskedForWithFewerPointsWhenRough) {

@@ -2,9 +2,13 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
+#include <limits>
 
+#include "transport/view_factors.h"
 #include "verification/basis_checks.h"
+#include "verification/view_factor_scenes.h"
 
 namespace truebox {
 namespace {
@@ -45,6 +49,55 @@ INSTANTIATE_TEST_SUITE_P(Groups, CertifiedValues,
                                          Group{"cube", check_ceiling_lit_cube, 12, 10.0},
                                          Group{"cie171", check_cie171, 40, 9.0}),
                          [](const auto& group) { return group.param.name; });
+
+// The smallest length that a view factor of these polygons can hang on: edges, widths, gaps between
+// corners, heights over each other's planes. What touches has none.
+double smallest_length(const std::vector<SceneOutline>& outlines) {
+  double smallest = std::numeric_limits<double>::infinity();
+  const auto count = [&](double length) {
+    if (length > 1e-9) smallest = std::min(smallest, length);
+  };
+  for (const SceneOutline& a : outlines)
+    for (const SceneOutline& b : outlines)
+      for (std::size_t k = 0; k < b.outline.size(); ++k) {
+        const Vec3 &p = b.outline[k], along = b.outline[(k + 1) % b.outline.size()] - p;
+        count(std::abs(plane_of(a.outline).distance_m(p)));
+        for (const Vec3& v : a.outline) {
+          count((v - p).norm());
+          if (&a == &b) count((v - p).cross(along.normalized()).norm());
+        }
+      }
+  return smallest;
+}
+
+TEST(CertifiedViewFactors, AreTheSameTurnedScaledAndFarAway) {
+  // Far away, 1e6 sizes of the scene, coordinates are rounded to u: view factors follow them with a
+  // slope of some units over the smallest length of the row, and no program can do better.
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(0.83, Vec3(0.3, -0.5, 0.8).normalized()).toRotationMatrix();
+  std::size_t rows = 0;
+  for (const CertifiedScene& row : view_factor_scenes(TRUEBOX_REFERENCE_DIR)) {
+    if (row.relative_model_error > 0.0) continue;
+    ++rows;
+    const Scene original = scene_of(row.outlines);
+    const auto expect_same = [&](double scale, const Vec3& shift, double allowed) {
+      Scene moved = original;
+      for (Surface& surface : moved.surfaces)
+        for (Polygon& piece : surface.pieces)
+          for (Vec3& v : piece) v = scale * (turn * v) + shift;
+      const ViewFactors factors(moved);
+      const double found =
+          factors.between(0, 1, {}).exchange_area_m2 / factors.area_m2(0) / row.view_factor;
+      EXPECT_NEAR(found, 1.0, allowed) << row.name << ", scale " << scale << ", " << shift.norm();
+    };
+    for (double scale : {1e-6, 1e6}) expect_same(scale, Vec3::Zero(), 2e-9);
+    const double size = original.diameter_m();
+    const double u = 1e6 * size * std::numeric_limits<double>::epsilon();
+    expect_same(1.0, 1e6 * size * Vec3(0.6, -0.2, 0.3),
+                2e-9 + 8.0 * u / smallest_length(row.outlines));
+  }
+  EXPECT_GE(rows, 35u);
+}
 
 TEST(CubeContinuum, IsReachedToAMillionth) {
   // The certified means are good to 2e-7.
