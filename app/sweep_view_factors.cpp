@@ -100,7 +100,10 @@ SweepPoint measure(const ViewFactors& factors, const std::vector<Reference>& pai
         found[k].error_bound_m2 / pairs[k].exchange_m2 / static_cast<double>(pairs.size());
     point.error += relative * relative / static_cast<double>(pairs.size());
   }
-  point.error = std::max(std::sqrt(point.error), 1e-16);  // a plot has no 0
+  // Below what the reference is good to nothing can be told, and a plot has no 0.
+  double floor = 1e-16;
+  for (const Reference& pair : pairs) floor = std::max(floor, pair.bound_m2 / pair.exchange_m2);
+  point.error = std::max(std::sqrt(point.error), floor);
   point.bound_held = static_cast<double>(held) / static_cast<double>(pairs.size());
   return point;
 }
