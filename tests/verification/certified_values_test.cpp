@@ -77,7 +77,7 @@ TEST(CertifiedViewFactors, AreTheSameTurnedScaledAndFarAway) {
       Eigen::AngleAxisd(0.83, Vec3(0.3, -0.5, 0.8).normalized()).toRotationMatrix();
   std::size_t rows = 0;
   for (const CertifiedScene& row : view_factor_scenes(TRUEBOX_REFERENCE_DIR)) {
-    if (row.relative_model_error > 0.0) continue;
+    if (row.relative_model_error > 1e-8) continue;  // round shapes: another polygon each time
     ++rows;
     const Scene original = scene_of(row.outlines);
     const auto expect_same = [&](double scale, const Vec3& shift, double allowed) {
