@@ -61,10 +61,6 @@ OnBasis solve(const PredictionArguments& a, int degree) {
   result.degree = degree;
   const Scene& scene = result.scene;
   require_lambertian(scene);
-  if (const Requirements needs = requirements(scene); needs.occlusion)
-    throw InputError(scene.path, 0,
-                     "a scene without occlusion for --basis " + std::string(kNames[degree]),
-                     "surfaces that can stand between others");
   const auto start = std::chrono::steady_clock::now();
   const std::size_t functions = static_cast<std::size_t>(degree + 1) * (degree + 1);
   const std::size_t elements = a.elements > 0 ? a.elements : kUnknowns / functions;

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "scene/requirements.h"
+#include "transport/enclosure.h"
 #include "transport/moment_integrals.h"
 #include "transport/quadrature.h"
 
@@ -42,13 +43,16 @@ GalerkinSystem::GalerkinSystem(const PatchMesh& mesh, const Scene& scene,
                                const GalerkinOptions& options)
     : options_(options), surface_count_(scene.surfaces.size()) {
   if (const std::string why = options.invalid(); !why.empty()) throw std::invalid_argument(why);
-  if (requirements(scene).occlusion)
-    throw std::invalid_argument(
-        "polynomial elements need a scene in which no surface can come between two others");
+  std::unique_ptr<Visibility> rays;
+  if (requirements(scene).occlusion) {
+    visible_ = std::make_shared<VisibleMoments>(mesh, scene);
+    rays = std::make_unique<Visibility>(mesh, scene);
+  }
   Polygon polygon;
-  for (const Patch& patch : mesh.patches) {
+  for (std::size_t p = 0; p < mesh.size(); ++p) {
+    const Patch& patch = mesh.patches[p];
     const std::size_t surface = mesh.surface_of(patch);
-    if (scene.surfaces[surface].is_opening) continue;
+    if (scene.surfaces[surface].is_opening || (rays && is_buried(mesh, scene, *rays, p))) continue;
     mesh.polygon_of(patch, polygon);
     for (PolynomialElement& element : polynomial_elements(polygon, options.degree)) {
       elements_.push_back(std::move(element));
@@ -76,12 +80,20 @@ void GalerkinSystem::integrate_kernel() {
   tbb::parallel_for(std::size_t{0}, elements_.size(), [&](std::size_t i) {
     for (std::size_t j = 0; j < i; ++j) {
       if (!sees(elements_[i], elements_[j]) || !sees(elements_[j], elements_[i])) continue;
-      const Eigen::MatrixXd block =
-          exchange_moments(elements_[i], elements_[j], options_.relative_tolerance);
+      const Eigen::MatrixXd block = moments_of(elements_[i], elements_[j]);
       k.block(first_[i], first_[j], block.rows(), block.cols()) = block;
       k.block(first_[j], first_[i], block.cols(), block.rows()) = block.transpose();
     }
   });
+}
+
+Eigen::MatrixXd GalerkinSystem::moments_of(const PolynomialElement& i,
+                                           const PolynomialElement& j) const {
+  if (visible_) {
+    const auto between = visible_->between(i, j);
+    if (!between.empty() || !faces_wholly(i, j)) return visible_->exchange(i, j, between);
+  }
+  return exchange_moments(i, j, options_.relative_tolerance);
 }
 
 std::vector<Index> GalerkinSystem::unknowns_of_degree(int degree) const {
@@ -99,6 +111,7 @@ GalerkinSystem GalerkinSystem::at_degree(int degree) const {
   if (const std::string why = lower.options_.invalid(); !why.empty() || degree > options_.degree)
     throw std::invalid_argument("degree must lie in [0, " + std::to_string(options_.degree) + "]");
   lower.surface_count_ = surface_count_;
+  lower.visible_ = visible_;
   lower.surface_ = surface_;
   for (std::size_t e = 0; e < elements_.size(); ++e) {
     const auto& c = elements_[e].corners();
@@ -188,10 +201,18 @@ Eigen::MatrixXd GalerkinSystem::gathered(std::size_t e, const std::vector<Vec3>&
   Eigen::VectorXd moments;
   for (std::size_t j = 0; j < elements_.size(); ++j) {
     if (!sees(elements_[e], elements_[j]) || !sees(elements_[j], elements_[e])) continue;
+    std::vector<const Blocker*> between;
+    if (visible_) between = visible_->between(elements_[e], elements_[j]);
+    const bool is_clear =
+        !visible_ || (between.empty() && faces_wholly(elements_[e], elements_[j]));
     for (std::size_t p = 0; p < points.size(); ++p) {
       moments.setZero(elements_[j].functions());
-      add_gathered_moments(points[p], elements_[e].normal(), elements_[j],
-                           options_.relative_tolerance, moments.data());
+      if (is_clear)
+        add_gathered_moments(points[p], elements_[e].normal(), elements_[j],
+                             options_.relative_tolerance, moments.data());
+      else
+        visible_->add_gathered(points[p], elements_[e].normal(), elements_[j], between,
+                               moments.data());
       sum.row(static_cast<Index>(p)).noalias() +=
           moments.transpose() * coefficients.middleRows(first_[j], moments.size());
     }
