@@ -92,9 +92,9 @@ Eigen::VectorXd Prediction::solver_bounds() const {
   for (std::size_t i = 0; i < fine().mesh.size(); ++i) {
     if (!fine().usable[i]) continue;
     const auto row = static_cast<Index>(i);
-    mean += fine().mesh.patches[i].area_m2 *
-            (fine().direct.row(row) + fine().indirect.row(row)).transpose();
-    area_m2 += fine().mesh.patches[i].area_m2;
+    mean +=
+        fine().free_area_m2[row] * (fine().direct.row(row) + fine().indirect.row(row)).transpose();
+    area_m2 += fine().free_area_m2[row];
   }
   if (area_m2 > 0.0) sum += kLinksAtMost * fine().links->relative_error / area_m2 * mean;
   return sum;
@@ -123,7 +123,7 @@ void Prediction::compare_grids() const {
             element[k] = levels_[k]->smooth().find_patch(patch.piece, patch.centroid);
           if (!fine().usable[i]) continue;
           const auto compare = [&](const Vec3& point) {
-            for (int k = 0; k < 3; ++k) levels_[k]->smooth().evaluate(element[k], point, at[k]);
+            for (int k = 0; k < 3; ++k) levels_[k]->evaluate(element[k], point, at[k]);
             const Eigen::VectorXd guard = guarded_difference(at[0], at[1], at[2], kSmoothOrder);
             const Eigen::VectorXd own = factor.cwiseProduct((at[0] - at[1]).cwiseAbs());
             indirect_bound_.row(i) =
@@ -193,10 +193,11 @@ ErrorShares Prediction::find_error_shares(const Level& resampled) const {
     const auto row = static_cast<Index>(i);
     if (!coarse().usable[i] || scene_->surfaces[next.surface_of(next.patches[i])].is_opening)
       continue;
-    area += next.patches[i].area_m2;
-    mean += next.patches[i].area_m2 * (coarse().direct.row(row) + coarse().indirect.row(row));
-    sampling += next.patches[i].area_m2 *
-                (coarse().indirect.row(row) - resampled.solution.indirect.row(row)).cwiseAbs();
+    const double free_m2 = coarse().free_area_m2[row];
+    area += free_m2;
+    mean += free_m2 * (coarse().direct.row(row) + coarse().indirect.row(row));
+    sampling +=
+        free_m2 * (coarse().indirect.row(row) - resampled.solution.indirect.row(row)).cwiseAbs();
   }
   const BandMatrix bound = surface_irradiance_bound();
   Eigen::VectorXd grids = Eigen::VectorXd::Zero(bound.cols());
@@ -229,7 +230,7 @@ BandMatrix Prediction::surface_irradiance_bound() const {
   Eigen::VectorXd children_area = Eigen::VectorXd::Zero(children.rows());
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     if (!fine().usable[i]) continue;
-    const double area = mesh.patches[i].area_m2;
+    const double area = fine().free_area_m2[static_cast<Index>(i)];
     const Patch& patch = mesh.patches[i];
     const std::uint32_t parent = levels_[1]->smooth().find_patch(patch.piece, patch.centroid);
     children.row(parent) += area * fine().indirect.row(static_cast<Index>(i));
