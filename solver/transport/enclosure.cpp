@@ -16,6 +16,8 @@
 namespace truebox {
 namespace {
 
+constexpr int kRaysOfBuried =
+    512;  // an element that sees 1 % is taken for buried once in 170 times
 constexpr double kNegligibleCover = 1e-3;  // below, what lacks may be the quadrature's error
 
 // The underside of a block that stands on a floor: a surface of opposite normal at this point.
@@ -96,10 +98,14 @@ Vec3 sample_polygon(const Polygon& p, double u, double v) {
 
 bool is_buried(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
                std::size_t patch) {
-  const Vec3& normal = mesh.plane_of(mesh.patches[patch]).normal;
-  const Vec3& centre = mesh.patches[patch].centroid;
-  const auto hit = visibility.first_hit(centre + visibility.offset_m() * normal, normal, true);
-  return hit ? !hit->front : lies_on_a_back(mesh, scene, patch, centre);
+  if (lies_on_a_back(mesh, scene, patch, mesh.patches[patch].centroid)) return true;
+  // Inside a solid every ray meets a back; below a sheet, however dark it is there, some do not.
+  ElementRays rays(mesh, visibility, patch, 0);
+  for (int k = 0; k < kRaysOfBuried; ++k) {
+    const auto hit = rays.cast();
+    if (!hit || hit->front) return false;
+  }
+  return true;
 }
 
 bool is_free(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,

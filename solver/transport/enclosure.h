@@ -16,8 +16,8 @@ double unit_interval(std::uint64_t bits);  ///< the upper 53 bits as a number in
 /// square-root map.
 Vec3 sample_polygon(const Polygon& polygon, double u, double v);
 
-/// Whether an element whose row of form factors is empty lies under another surface: a ray from its
-/// centroid meets the back of a surface at once, or a surface of opposite normal lies on it.
+/// Whether an element whose row of form factors is (nearly) empty lies under another surface: one
+/// of opposite normal lies on it, or all of many cosine-distributed rays meet backs of surfaces.
 bool is_buried(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
                std::size_t patch);
 

@@ -111,6 +111,7 @@ void Prediction::compare_grids() const {
   indirect_bound_ = BandMatrix::Zero(fine().indirect.rows(), bands);
   if (!needs_.interreflection) return;
   const Eigen::VectorXd factor = pointwise_factor(distinct_scene_);
+  const bool is_constant = levels_[0]->reconstruction == Reconstruction::constant;
   tbb::parallel_for(
       tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.size())),
       [&](const auto& range) {
@@ -123,8 +124,14 @@ void Prediction::compare_grids() const {
             element[k] = levels_[k]->smooth().find_patch(patch.piece, patch.centroid);
           if (!fine().usable[i]) continue;
           const auto compare = [&](const Vec3& point) {
-            for (int k = 0; k < 3; ++k) levels_[k]->evaluate(element[k], point, at[k]);
-            const Eigen::VectorXd guard = guarded_difference(at[0], at[1], at[2], kSmoothOrder);
+            for (int k = 0; k < 3; ++k)
+              if (is_constant)
+                levels_[k]->smooth().evaluate(element[k], point, at[k]);
+              else
+                levels_[k]->evaluate(element[k], point, at[k]);
+            Eigen::VectorXd guard = guarded_difference(at[0], at[1], at[2], kSmoothOrder);
+            // Steps between elements say little of the slope within one: the smooth field does.
+            if (is_constant) guard += (at[0] - fine().indirect.row(i).transpose()).cwiseAbs();
             const Eigen::VectorXd own = factor.cwiseProduct((at[0] - at[1]).cwiseAbs());
             indirect_bound_.row(i) =
                 indirect_bound_.row(i).cwiseMax(guard.cwiseMax(own).transpose());

@@ -120,6 +120,23 @@ TEST(PartlyCoveredElements, SunkenBlockLightsTheRoomAsOneThatStandsOnTheFloor) {
   EXPECT_NEAR(sunk.absorbed_W, emitted_W, 2e-3 * emitted_W);
 }
 
+// Below a sheet it is dark, and yet no element is buried there: the floor's mean is over all of it.
+TEST(BuriedElements, AreNotThoseInTheShadowOfASheet) {
+  Scene scene = tiny::grey_scene(0.5);
+  scene.materials.push_back({"lamp", Reflectance(1, 0.2), RadiantExitance(1, 1.0)});
+  tiny::add_surface(scene, "low", {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
+  tiny::add_surface(scene, "high", {{0, 0, 1}, {0, 1, 1}, {1, 1, 1}, {1, 0, 1}}, 1);
+  tiny::add_surface(scene, "between",
+                    {{0.2, 0.2, .5}, {0.7, 0.2, .5}, {0.7, 0.6, .5}, {0.2, 0.6, .5}});
+  for (const Way way : {Way::outlines, Way::rays}) {
+    const Means means = means_of(*solved(scene, way, 576));
+    EXPECT_NEAR(means.area_m2[0], 1.0, 1e-12);
+    // View factor by exact visibility, certain to 1e-9, and what the lamp reflects: below 1 %.
+    EXPECT_NEAR(means.irradiance[0], 0.121106, 0.01 * 0.121106);
+    EXPECT_GT(means.irradiance[0], 0.121106);
+  }
+}
+
 TEST(PartlyCoveredElements, CellsThatAnotherSurfaceCrossesAreFound) {
   const Scene standing = room_with_block(0.0, 0.5, 0.0), sunk = room_with_block(-0.07, 0.5, 0.0);
   const auto cell = [](double x0, double x1) {
