@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "transport/bounded_exchange.h"
+#include "transport/grazing_exchange.h"
 #include "transport/quadrature.h"
 
 namespace truebox {
@@ -180,13 +181,8 @@ double double_contour(const PlanarPolygon& first, const PlanarPolygon& second, d
   return std::max(0.0, sum / (2.0 * std::numbers::pi));
 }
 
-// Both polygons wholly in front of each other. The smaller one receives.
-double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tolerance,
-                     double* magnitude) {
-  const bool swap =
-      j.radius_m < i.radius_m || (j.radius_m == i.radius_m && j.centroid.sum() < i.centroid.sum());
-  const PlanarPolygon& receiver = swap ? j : i;
-  const PlanarPolygon& source = swap ? i : j;
+double contour_m2(const PlanarPolygon& receiver, const PlanarPolygon& source, double tolerance,
+                  double* magnitude) {
   double nearest = std::numeric_limits<double>::infinity();
   const double apart = (receiver.centroid - source.centroid).norm() - source.radius_m;
   if (apart > 10.0 * receiver.radius_m) {
@@ -203,6 +199,33 @@ double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tole
     *magnitude += receiver.area_m2 *
                   contour_magnitude(receiver.centroid, receiver.plane.normal, source.vertices);
   return lambert_quadrature(receiver, source, points);
+}
+
+// Each term carries some twenty roundings (logarithms, square roots, Gauss sums).
+constexpr double kRounding = 20.0 * std::numeric_limits<double>::epsilon();
+constexpr double kDigitsAskedFor = 1e-6;  // rougher answers do not mind that contours cancel
+constexpr double kCancels = 1e-11;
+constexpr double kGrazing = 0.1;  // relative height below which one plane is nearly shared
+
+// Both polygons wholly in front of each other. The smaller one receives.
+double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tolerance,
+                     double* magnitude) {
+  const bool swap =
+      j.radius_m < i.radius_m || (j.radius_m == i.radius_m && j.centroid.sum() < i.centroid.sum());
+  const PlanarPolygon& receiver = swap ? j : i;
+  const PlanarPolygon& source = swap ? i : j;
+  if (tolerance > kDigitsAskedFor) return contour_m2(receiver, source, tolerance, magnitude);
+  double terms = 0.0;
+  double result = contour_m2(receiver, source, tolerance, &terms);
+  if (kRounding * terms > kCancels * result) {
+    const double height = relative_height(i, j);
+    if (height > 0.0 && height < kGrazing) {
+      result = grazing_exchange_m2(receiver, source, tolerance);
+      terms = result / height;
+    }
+  }
+  if (magnitude) *magnitude += terms;
+  return result;
 }
 
 // Bit 0: some of the polygon lies above the plane, bit 1: some below.
@@ -271,8 +294,6 @@ BoundedExchange bounded_exchange(const PlanarPolygon& i, const PlanarPolygon& j,
   double magnitude = 0.0;
   BoundedExchange result;
   result.exchange_area_m2 = exchange_m2(i, j, relative_tolerance, &magnitude);
-  // Each term carries some twenty roundings (logarithms, square roots, Gauss sums).
-  constexpr double kRounding = 20.0 * std::numeric_limits<double>::epsilon();
   result.error_bound_m2 = relative_tolerance * result.exchange_area_m2 + kRounding * magnitude;
   return result;
 }
