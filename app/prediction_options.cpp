@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <optional>
 #include <stdexcept>
 
@@ -59,6 +60,19 @@ Scene read_scene_of(const PredictionArguments& a) {
   return read_scene(a.scene, {.lamp_weighted_bands = a.bands});
 }
 
+namespace {
+
+const std::map<std::string, Reconstruction>& reconstructions() {
+  static const std::map<std::string, Reconstruction> kNames = {
+      {"smooth", Reconstruction::smooth},
+      {"constant", Reconstruction::constant},
+      {"averaged", Reconstruction::averaged},
+      {"least-squares", Reconstruction::least_squares}};
+  return kNames;
+}
+
+}  // namespace
+
 void add_prediction_options(CLI::App& command, PredictionArguments& a,
                             const std::vector<std::string>& more_methods) {
   std::vector<std::string> methods = method_names();
@@ -106,6 +120,13 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
   command.add_flag("--discontinuities", a.discontinuities,
                    "elements follow the lines along which light and its derivatives jump: contacts "
                    "and outlines of shadows, e.g. solve box.toml --discontinuities -o box.glb");
+  command
+      .add_option("--reconstruction", a.reconstruction,
+                  "how element means become values at points of surfaces: smooth (quadratics, what "
+                  "else is done), constant, or radiosities of vertices: averaged (extrapolated to "
+                  "the edges, Cohen & Greenberg) or least-squares; e.g. solve box.toml "
+                  "--reconstruction averaged -o box.glb")
+      ->check(CLI::IsMember(reconstructions()));
   command
       .add_option("--bands", a.bands,
                   "so many bands, weighted by the lamps' light, instead of the scene's: 16 for "
@@ -164,6 +185,10 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
     options.solve.share_bands = false;  // every pass makes the matrix anew, for one band or for all
   }
   if (a.gather_edges) options.gathered_up_to = kMostGathered;
+  if (a.gather_edges && !a.reconstruction.empty())
+    throw InputError("--reconstruction", 0, "the smooth field with --gather-edges",
+                     a.reconstruction);
+  if (!a.reconstruction.empty()) options.reconstruction = reconstructions().at(a.reconstruction);
   options.solve_grid = a.solve_grid;
   options.watch_finest = a.watch_finest;
   options.form_factors.memory_limit_bytes = a.memory_MiB << 20;
@@ -294,6 +319,9 @@ std::string describe(const Predicted& p) {
   if (f.buried_patches > 0)
     text +=
         fmt::format("  {} elements lie under another surface and see nothing\n", f.buried_patches);
+  if (f.covered_patches > 0)
+    text += fmt::format("  {} elements lie partly under another surface: their free parts count\n",
+                        f.covered_patches);
   text +=
       f.closed
           ? fmt::format(
@@ -337,8 +365,8 @@ std::vector<SurfaceMean> surface_means(const Prediction& prediction) {
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     if (!prediction.fine().usable[i]) continue;
     SurfaceMean& mean = means[mesh.surface_of(mesh.patches[i])];
-    const double area = mesh.patches[i].area_m2;
     const auto row = static_cast<Eigen::Index>(i);
+    const double area = prediction.fine().free_area_m2[row];
     mean.area_m2 += area;
     mean.radiosity += area * radiosity.row(row).transpose();
     mean.irradiance += area * irradiance.row(row).transpose();

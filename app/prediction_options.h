@@ -32,9 +32,11 @@ struct PredictionArguments {
   double link_tolerance = HierarchyOptions{}.relative_tolerance;
   std::size_t memory_MiB = 8192;
   double relative_bound = SolveOptions{}.relative_bound;
-  std::string target_error;      ///< "0.5%" or "0.005": chooses elements and solver bound
-  std::string adaptive;          ///< empty: uniform; else the goal, or kDefaultGoal
-  bool gather_edges = false;     ///< the gathered field, see PredictOptions::gathered_up_to
+  std::string target_error;   ///< "0.5%" or "0.005": chooses elements and solver bound
+  std::string adaptive;       ///< empty: uniform; else the goal, or kDefaultGoal
+  bool gather_edges = false;  ///< the gathered field, see PredictOptions::gathered_up_to
+  /// "smooth", "constant", "averaged" or "least-squares"; empty where nothing was said: smooth
+  std::string reconstruction;
   bool discontinuities = false;  ///< elements follow lines of light and shadow
   std::size_t bands = 0;         ///< lamp-weighted ones instead of the scene's; 0: the scene's
   std::string automatic;  ///< empty: as said here; else as planned, for a goal or kDefaultGoal

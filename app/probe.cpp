@@ -70,6 +70,30 @@ std::vector<BoundedIrradiance> area_means(const Prediction& prediction, const st
   return means;
 }
 
+// The piece of surface that a point lies on, facing its way: what a reconstruction knows.
+std::uint32_t piece_at(const Prediction& prediction, const ProbePoint& point,
+                       const std::string& path) {
+  const PatchMesh& mesh = prediction.fine().mesh;
+  const double tolerance_m = 1e-6 * prediction.scene().diameter_m();
+  for (std::uint32_t p = 0; p < mesh.pieces.size(); ++p) {
+    const Polygon& polygon = mesh.pieces[p].polygon;
+    const Plane& plane = mesh.pieces[p].plane;
+    if (prediction.scene().surfaces[mesh.pieces[p].surface].is_opening ||
+        plane.normal.dot(point.normal) < 1.0 - 1e-6 ||
+        std::abs(plane.distance_m(point.position_m)) > tolerance_m)
+      continue;
+    bool is_inside = true;
+    for (std::size_t k = 0; k < polygon.size(); ++k) {
+      const Vec3 along = (polygon[(k + 1) % polygon.size()] - polygon[k]).normalized();
+      const Vec3 inwards = plane.normal.cross(along);
+      is_inside = is_inside && inwards.dot(point.position_m - polygon[k]) > -tolerance_m;
+    }
+    if (is_inside) return p;
+  }
+  throw InputError(path, 0, "points on lit surfaces, their normals too, for --reconstruction",
+                   '"' + point.name + "\" lies on none");
+}
+
 int probe(const ProbeArguments& a) {
   // Places are read first: a mistake there should not cost a solve. Their unit is the scene's.
   if (!a.points.empty()) read_points(a.points, 1.0);
@@ -85,9 +109,16 @@ int probe(const ProbeArguments& a) {
   const auto points = a.points.empty() ? std::vector<ProbePoint>{} : read_points(a.points, unit_m);
   answers.resize(points.size());
   for (const ProbePoint& point : points) names.push_back(point.name);
+  const bool gathers = a.prediction.reconstruction.empty();
+  std::vector<std::uint32_t> pieces;
+  for (std::size_t i = 0; i < points.size() && !gathers; ++i)
+    pieces.push_back(piece_at(*predicted->prediction, points[i], a.points));
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 1), [&](const auto& range) {
+    Gather::Scratch scratch;
     for (std::size_t i = range.begin(); i < range.end(); ++i)
-      answers[i] = predicted->prediction->irradiance_at(points[i].position_m, points[i].normal);
+      answers[i] =
+          gathers ? predicted->prediction->irradiance_at(points[i].position_m, points[i].normal)
+                  : predicted->prediction->irradiance_on(pieces[i], points[i].position_m, scratch);
   });
   if (!a.areas.empty()) {
     const auto areas = read_areas(a.areas, unit_m);
@@ -132,7 +163,10 @@ void add_probe_command(CLI::App& program, Action& chosen) {
   command->add_option("-o,--output", arguments->output, "CSV: name,band_nm,irradiance,error_bound");
   command->footer(
       "Example: truebox probe reference/cornell_box/cornell_box.toml\n"
-      "           --points reference/independent_renders/probe_points.csv -o irradiance.csv");
+      "           --points reference/independent_renders/probe_points.csv -o irradiance.csv\n"
+      "Points are gathered from all elements; with --reconstruction they are read from the field "
+      "on\n"
+      "their surface: quicker, and less exact.");
   command->callback([=, &chosen] { chosen = [=] { return probe(*arguments); }; });
 }
 

@@ -15,7 +15,6 @@
 #include "mesh/graded_mesh.h"
 #include "radiometry/input_error.h"
 #include "scene/requirements.h"
-#include "scene/scene_file.h"
 #include "transport/galerkin.h"
 
 namespace truebox::app {
@@ -27,6 +26,8 @@ constexpr const char* kNames[] = {"constant", "linear", "quadratic", "cubic", "q
 constexpr double kGrading = 3.0;         // t^3 towards edges; pays from degree 2 on
 constexpr double kTolerance = 1e-8;      // of the kernel's moments
 constexpr std::size_t kUnknowns = 2400;  // where --elements is not given
+constexpr std::size_t kUnknownsBehind =
+    400;  // where surfaces hide each other: hundreds of times the work a pair
 
 struct OnBasis {
   Scene scene;
@@ -57,17 +58,14 @@ BandMatrix of_surfaces(const Scene& scene, bool exitance) {
 
 OnBasis solve(const PredictionArguments& a, int degree) {
   OnBasis result;
-  result.scene = read_scene(a.scene);
+  result.scene = read_scene_of(a);
   result.degree = degree;
   const Scene& scene = result.scene;
   require_lambertian(scene);
-  if (const Requirements needs = requirements(scene); needs.occlusion)
-    throw InputError(scene.path, 0,
-                     "a scene without occlusion for --basis " + std::string(kNames[degree]),
-                     "surfaces that can stand between others");
   const auto start = std::chrono::steady_clock::now();
   const std::size_t functions = static_cast<std::size_t>(degree + 1) * (degree + 1);
-  const std::size_t elements = a.elements > 0 ? a.elements : kUnknowns / functions;
+  const std::size_t unknowns = requirements(scene).occlusion ? kUnknownsBehind : kUnknowns;
+  const std::size_t elements = a.elements > 0 ? a.elements : unknowns / functions;
   const double edge_m = edge_for_count(scene, elements);
   const PatchMesh mesh =
       degree > 1 ? graded_mesh(scene, edge_m, kGrading) : uniform_mesh(scene, edge_m);

@@ -82,13 +82,20 @@ DistributedRows::DistributedRows(const Partition& partition, const PatchMesh& me
   const Visibility visibility(mesh, scene);
   leave_out_buried(mesh, scene, visibility);
   const auto begin = static_cast<std::size_t>(partition.begin());
-  const ClosureTest closure = test_closure(mesh, scene, visibility, usable_, options.seed, begin,
+  VectorXd own_sums = VectorXd::Ones(partition.rows());  // other ranks look after theirs
+  own_sums.segment(partition.begin(), partition.local()) =
+      row_sums().cwiseQuotient(area_m2_.segment(partition.begin(), partition.local()));
+  tested_ = whole_patches(mesh, scene, usable_, own_sums);
+  const ClosureTest closure = test_closure(mesh, scene, visibility, tested_, options.seed, begin,
                                            begin + static_cast<std::size_t>(partition.local()));
   summary_.closure_rays =
       static_cast<std::size_t>(partition.sum(static_cast<double>(closure.rays)));
   const bool none_escaped = closure.closed || closure.rays == 0;
   summary_.closed = partition.max(none_escaped ? 0.0 : 1.0) == 0.0 && summary_.closure_rays > 0;
-  if (summary_.closed) repair();
+  if (summary_.closed) {
+    leave_out_outside(own_sums);
+    repair();
+  }
   summary_.row_sum_max =
       partition.max(partition.local() > 0
                         ? row_sums()
@@ -152,16 +159,29 @@ void DistributedRows::leave_out_buried(const PatchMesh& mesh, const Scene& scene
   }
 }
 
+// In a closed scene what sees nothing lies outside of it; its row is empty.
+void DistributedRows::leave_out_outside(const VectorXd& own_sums) {
+  std::vector<char> sees(static_cast<std::size_t>(partition_.local()));
+  for (Index k = 0; k < partition_.local(); ++k)
+    sees[static_cast<std::size_t>(k)] = usable_[static_cast<std::size_t>(partition_.begin() + k)] &&
+                                        own_sums[partition_.begin() + k] >= kEmptyRow;
+  partition_.gather(sees, usable_);
+  summary_.buried_patches = static_cast<std::size_t>(std::count(usable_.begin(), usable_.end(), 0));
+}
+
 // S_ij <- x_i x_j S_ij of the entries in `partial_`, until each row sums to its area.
 void DistributedRows::repair() {
   const Index local = partition_.local(), begin = partition_.begin();
   const VectorXd missing = area_m2_.segment(begin, local) - row_sums();
   VectorXd open = VectorXd::Zero(local);
   std::vector<char> is_whole(static_cast<std::size_t>(local));
-  for (Index k = 0; k < local; ++k)
-    is_whole[static_cast<std::size_t>(k)] =
-        usable_[static_cast<std::size_t>(begin + k)] &&
-        std::abs(missing[k]) <= kPartlyBuriedRow * area_m2_[begin + k];
+  std::vector<Index> covered;
+  for (Index k = 0; k < local; ++k) {
+    const auto patch = static_cast<std::size_t>(begin + k);
+    const double lacks = missing[k] / area_m2_[begin + k];
+    if (usable_[patch] && !tested_[patch]) covered.push_back(k);
+    is_whole[static_cast<std::size_t>(k)] = tested_[patch] && std::abs(lacks) <= kUnmendableRow;
+  }
   double before = 0.0, weighted = 0.0, total = 0.0;
   std::vector<char> mended(static_cast<std::size_t>(local));
   for (Index k = 0; k < local; ++k) {
@@ -205,6 +225,11 @@ void DistributedRows::repair() {
     if (is_whole[static_cast<std::size_t>(k)])
       after = std::max(after, std::abs(rows_.row(k).sum() / area_m2_[begin + k] - 1));
   }
+  VectorXd area = area_m2_.segment(begin, local);
+  for (Index k : covered) area[k] = rows_.row(k).sum();
+  partition_.gather(area.data(), area_m2_);
+  summary_.covered_patches =
+      static_cast<std::size_t>(partition_.sum(static_cast<double>(covered.size())));
   summary_.repair_max = partition_.max(largest);
   summary_.closure_residual_max = partition_.max(after);
 }

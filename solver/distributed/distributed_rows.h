@@ -46,13 +46,14 @@ class DistributedRows {
                   const FormFactorOptions& options);
 
   const Matrix& exchange_area_m2() const { return rows_; }     ///< local x n
-  const Eigen::VectorXd& area_m2() const { return area_m2_; }  ///< of all n
+  const Eigen::VectorXd& area_m2() const { return area_m2_; }  ///< free, of all n
   const std::vector<char>& usable() const { return usable_; }
   const FormFactorSummary& summary() const { return summary_; }
 
  private:
   void fill(const PatchMesh& mesh, const Scene& scene, const FormFactorOptions& options);
   void leave_out_buried(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility);
+  void leave_out_outside(const Eigen::VectorXd& own_sums);
   void repair();
   Eigen::VectorXd row_sums() const { return rows_.rowwise().sum(); }
 
@@ -60,7 +61,7 @@ class DistributedRows {
   Matrix rows_;
   std::vector<std::vector<std::uint32_t>> partial_;  // of each local row
   Eigen::VectorXd area_m2_;
-  std::vector<char> usable_;
+  std::vector<char> usable_, tested_;  // tested: neither buried nor partly covered
   FormFactorSummary summary_;
 };
 

@@ -221,6 +221,7 @@ SolveGrid DistributedRun::solve_grid() {
     const DistributedRows rows(partition, grid.mesh, task.scene, task.form_factors);
     const double solve_start_s = MPI_Wtime();
     grid.usable = rows.usable();
+    task.take_free_areas(rows.area_m2());
     grid.form_factors = rows.summary();
     solve_with_near_sources(task, grid, [&](const BandMatrix& source, const SolveOptions& options) {
       grid.solve = {};

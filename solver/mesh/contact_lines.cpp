@@ -22,7 +22,39 @@ bool crosses_inside(const Vec3& from, const Vec3& to, const Polygon& polygon, co
   return (t1 - t0) * (to - from).norm() > margin;
 }
 
+// Where a convex polygon meets a plane: its edges if it lies in it, else at most one segment.
+std::vector<ContactLine> traces(const Polygon& other, const Plane& plane, double tolerance) {
+  std::vector<ContactLine> lines;
+  std::vector<Vec3> met;
+  bool is_flat = true;
+  for (std::size_t i = 0; i < other.size(); ++i) {
+    const Vec3 &a = other[i], &b = other[(i + 1) % other.size()];
+    const double da = plane.distance_m(a), db = plane.distance_m(b);
+    lines.push_back({a, b});
+    is_flat = is_flat && std::abs(da) <= tolerance;
+    if (std::abs(da) <= tolerance)
+      met.push_back(a);
+    else if (std::abs(db) > tolerance && da * db < 0.0)
+      met.push_back(a + da / (da - db) * (b - a));
+  }
+  if (is_flat) return lines;
+  if (met.size() != 2) return {};
+  return {{met[0], met[1]}};
+}
+
 }  // namespace
+
+bool is_crossed(const Polygon& cell, const Scene& scene) {
+  const Plane plane = plane_of(cell);
+  const double margin = 1e-6 * diameter_m(cell);
+  for (const Surface& surface : scene.surfaces) {
+    if (surface.is_opening) continue;
+    for (const Polygon& other : surface.pieces)
+      for (const ContactLine& line : traces(other, plane, margin))
+        if (crosses_inside(line.from, line.to, cell, plane.normal, margin)) return true;
+  }
+  return false;
+}
 
 std::vector<ContactLine> contact_lines(const Polygon& piece, const Scene& scene) {
   const Plane plane = plane_of(piece);

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "mesh/hanging_vertices.h"
@@ -112,23 +111,31 @@ std::span<const std::uint32_t> PatchTopology::across(std::uint32_t patch, std::s
 std::vector<std::uint32_t> PatchTopology::reachable(const std::vector<char>& usable,
                                                     std::uint32_t start, std::uint32_t vertex,
                                                     int rings) const {
-  std::set<std::uint32_t> ring(patches_at_[vertex].begin(), patches_at_[vertex].end());
-  for (int r = 1; r < rings; ++r) {
-    std::set<std::uint32_t> wider = ring;
-    for (std::uint32_t p : ring)
-      for (std::uint32_t v : mesh_->corners_of(mesh_->patches[p]))
-        wider.insert(patches_at_[v].begin(), patches_at_[v].end());
-    ring.swap(wider);
+  std::vector<std::uint32_t> ring = patches_at_[vertex], wider;  // sorted, each once
+  for (int r = 0; r < rings; ++r) {
+    if (r > 0) {
+      wider = ring;
+      for (std::uint32_t p : ring)
+        for (std::uint32_t v : mesh_->corners_of(mesh_->patches[p]))
+          wider.insert(wider.end(), patches_at_[v].begin(), patches_at_[v].end());
+      ring.swap(wider);
+    }
+    std::sort(ring.begin(), ring.end());
+    ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
   }
+  std::vector<char> seen(ring.size(), 0);
+  const auto see = [&](std::uint32_t p) {  // true the first time
+    const auto at = std::lower_bound(ring.begin(), ring.end(), p);
+    if (at == ring.end() || *at != p) return false;
+    return !std::exchange(seen[static_cast<std::size_t>(at - ring.begin())], 1);
+  };
   std::vector<std::uint32_t> found{start};
-  std::set<std::uint32_t> seen{start};
+  see(start);
   for (std::size_t next = 0; next < found.size(); ++next) {
     const std::size_t corners = mesh_->corners_of(mesh_->patches[found[next]]).size();
     for (std::size_t k = 0; k < corners; ++k)
-      for (std::uint32_t other : across(found[next], k)) {
-        if (!usable[other] || !ring.contains(other)) continue;
-        if (seen.insert(other).second) found.push_back(other);
-      }
+      for (std::uint32_t other : across(found[next], k))
+        if (usable[other] && see(other)) found.push_back(other);
   }
   std::sort(found.begin(), found.end());
   return found;

@@ -324,8 +324,8 @@ class Planner {
                             : count(all - distinct) + " are exact multiples of others";
     if (distinct < all) d.left_out = "bands that are multiples of others";
     if (reduced > 0) {
-      d.why += "; surfaces share few materials, so " + count(static_cast<std::size_t>(reduced)) +
-               " are found on a basis that bands share, each held to its own residual";
+      d.why += "; spectra are alike, so " + count(static_cast<std::size_t>(reduced)) +
+               " are found from products of the others, each held to its own residual";
       d.left_out += std::string(d.left_out.empty() ? "" : ", and ") + "passes of their own";
       d.error_kind = ErrorKind::bound;
       d.error = solver_bound;

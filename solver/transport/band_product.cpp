@@ -13,65 +13,151 @@
 namespace truebox {
 namespace {
 
-constexpr Eigen::Index kBands = 8;  // one panel: a cache line of doubles
-constexpr Eigen::Index kRows = 4;
+using Eigen::Index;
 
-using Panel = double __attribute__((vector_size(kBands * sizeof(double))));
+constexpr Index kLanes = 8;  // of a vector: a cache line of doubles
+constexpr Index kMostPanels = 3;
+constexpr Index kMostRows = 16;
+constexpr Index kTaskRows = 48;  // of one task: a multiple of every tile's rows
 
-// sums[r] = sum_j s[r][j] x[j] for four rows and one panel of eight bands.
-TRUEBOX_MANY_TARGETS
-void four_rows(const double* s0, const double* s1, const double* s2, const double* s3,
-               const double* panel, Eigen::Index n, double* sums) {
-  Panel a{}, b{}, c{}, d{}, x;
-  for (Eigen::Index j = 0; j < n; ++j) {
-    std::memcpy(&x, panel + j * kBands, sizeof x);
-    a += s0[j] * x;
-    b += s1[j] * x;
-    c += s2[j] * x;
-    d += s3[j] * x;
+using Vector = double __attribute__((vector_size(kLanes * sizeof(double))));
+
+// out[r][c] = sum_j rows[r][j] x[j][c], c < kPanels * kLanes. The sums stay in registers: as many
+// rows and columns at a time as those hold, because each number of a row is then read from memory
+// for all columns at once, and each of x for all rows. Source: Goto & van de Geijn (2008).
+template <Index kRows, Index kPanels>
+[[gnu::always_inline]] inline void multiply_tile(const double* rows, Index stride, const double* x,
+                                                 Index n, double* out) {
+  Vector sums[kRows][kPanels] = {};
+  for (Index j = 0; j < n; ++j) {
+    Vector column[kPanels];
+#pragma GCC unroll 3
+    for (Index p = 0; p < kPanels; ++p)
+      std::memcpy(&column[p], x + (j * kPanels + p) * kLanes, sizeof column[p]);
+#pragma GCC unroll 16
+    for (Index r = 0; r < kRows; ++r) {
+      const double s = rows[r * stride + j];
+#pragma GCC unroll 3
+      for (Index p = 0; p < kPanels; ++p) sums[r][p] += s * column[p];
+    }
   }
-  std::memcpy(sums, &a, sizeof a);
-  std::memcpy(sums + kBands, &b, sizeof b);
-  std::memcpy(sums + 2 * kBands, &c, sizeof c);
-  std::memcpy(sums + 3 * kBands, &d, sizeof d);
+  std::memcpy(out, sums, sizeof sums);
 }
 
-// Panels of eight bands, one after the other, zeros where bands end.
-std::vector<double> packed(const BandMatrix& x) {
-  const Eigen::Index n = x.rows(), m = x.cols(), panels = (m + kBands - 1) / kBands;
-  std::vector<double> values(static_cast<std::size_t>(panels * n * kBands), 0.0);
-  for (Eigen::Index panel = 0; panel < panels; ++panel) {
-    const Eigen::Index first = panel * kBands, count = std::min(kBands, m - first);
-    for (Eigen::Index j = 0; j < n; ++j)
-      std::copy_n(x.data() + j * m + first, count, values.data() + (panel * n + j) * kBands);
+// One column: as fast as the rows come from memory.
+template <Index kRows>
+[[gnu::always_inline]] inline void multiply_vector(const double* rows, Index stride,
+                                                   const double* x, Index n, double* out) {
+  Vector sums[kRows] = {};
+  const Index whole = n - n % kLanes;
+  for (Index j = 0; j < whole; j += kLanes) {
+    Vector column, row;
+    std::memcpy(&column, x + j, sizeof column);
+    for (Index r = 0; r < kRows; ++r) {
+      std::memcpy(&row, rows + r * stride + j, sizeof row);
+      sums[r] += row * column;
+    }
   }
-  return values;
+  for (Index r = 0; r < kRows; ++r) {
+    double sum = 0.0;
+    for (Index lane = 0; lane < kLanes; ++lane) sum += sums[r][lane];
+    for (Index j = whole; j < n; ++j) sum += rows[r * stride + j] * x[j];
+    out[r] = sum;
+  }
+}
+
+struct Tile {
+  void (*multiply)(const double* rows, Index stride, const double* x, Index n, double* out);
+  Index rows;
+};
+
+TRUEBOX_MANY_TARGETS
+void vector_tile(const double* rows, Index stride, const double* x, Index n, double* out) {
+  multiply_vector<4>(rows, stride, x, n, out);
+}
+
+// Sixteen registers of four doubles hold no more.
+TRUEBOX_MANY_TARGETS
+void narrow_tile(const double* rows, Index stride, const double* x, Index n, double* out) {
+  multiply_tile<4, 1>(rows, stride, x, n, out);
+}
+
+#ifdef TRUEBOX_WIDE_VECTORS
+// Thirty-two of eight.
+template <Index kRows, Index kPanels>
+TRUEBOX_WIDE_VECTORS void wide_tile(const double* rows, Index stride, const double* x, Index n,
+                                    double* out) {
+  multiply_tile<kRows, kPanels>(rows, stride, x, n, out);
+}
+#endif
+
+// For so many panels at once; nothing where the machine's registers do not hold them.
+Tile tile_of(Index panels) {
+#ifdef TRUEBOX_WIDE_VECTORS
+  static const bool is_wide = __builtin_cpu_supports("avx512f") != 0;
+  if (is_wide && panels == 3) return {wide_tile<8, 3>, 8};
+  if (is_wide && panels == 2) return {wide_tile<12, 2>, 12};
+  if (is_wide && panels == 1) return {wide_tile<16, 1>, 16};
+#endif
+  return panels == 1 ? Tile{narrow_tile, 4} : Tile{nullptr, 0};
+}
+
+// Columns that are multiplied at once, x packed for that: row by row, zeros where bands end.
+struct Group {
+  Tile tile;
+  Index first = 0, width = 0;  // columns of x; of the packed ones
+  std::vector<double> x;
+};
+
+std::vector<Group> groups_of(const BandMatrix& x) {
+  std::vector<Group> groups;
+  const Index n = x.rows(), m = x.cols();
+  if (m == 1) return {{{vector_tile, 4}, 0, 1, std::vector<double>(x.data(), x.data() + n)}};
+  for (Index first = 0; first < m;) {
+    Index panels = std::min((m - first + kLanes - 1) / kLanes, kMostPanels);
+    while (!tile_of(panels).multiply) --panels;
+    Group group{tile_of(panels), first, panels * kLanes, {}};
+    group.x.assign(static_cast<std::size_t>(n * group.width), 0.0);
+    const Index count = std::min(group.width, m - first);
+    for (Index j = 0; j < n; ++j)
+      std::copy_n(x.data() + j * m + first, count, group.x.data() + j * group.width);
+    first += group.width;
+    groups.push_back(std::move(group));
+  }
+  return groups;
+}
+
+// Rows `begin` to before `end` of y; the last tile starts early enough to be whole.
+void multiply_rows(const double* rows, Index stride, Index begin, Index end, const Group& group,
+                   BandMatrix& y) {
+  double sums[kMostRows * kMostPanels * kLanes];
+  const Index n = static_cast<Index>(group.x.size()) / group.width;
+  const Index columns = std::min(group.width, y.cols() - group.first);
+  for (Index first = begin; first < end; first += group.tile.rows) {
+    const Index from = std::max<Index>(0, std::min(first, y.rows() - group.tile.rows));
+    group.tile.multiply(rows + from * stride, stride, group.x.data(), n, sums);
+    for (Index i = first; i < std::min(first + group.tile.rows, end); ++i)
+      std::copy_n(sums + (i - from) * group.width, columns, y.data() + i * y.cols() + group.first);
+  }
 }
 
 // `count` rows, `stride` apart, of each as many numbers as x has rows.
-BandMatrix product_of_rows(const double* rows, Eigen::Index count, Eigen::Index stride,
-                           const BandMatrix& x) {
-  const Eigen::Index n = x.rows(), m = x.cols(), panels = (m + kBands - 1) / kBands;
-  const std::vector<double> panel_values = packed(x);
-  BandMatrix y(count, m);
-  tbb::parallel_for(
-      tbb::blocked_range<Eigen::Index>(0, (count + kRows - 1) / kRows, 8), [&](const auto& range) {
-        double sums[kRows * kBands];
-        // A block of rows stays in cache while the panels pass over it.
-        for (Eigen::Index panel = 0; panel < panels; ++panel)
-          for (Eigen::Index block = range.begin(); block < range.end(); ++block) {
-            const Eigen::Index first = block * kRows;
-            // The last block repeats a row.
-            const auto row = [&](Eigen::Index r) {
-              return rows + std::min(first + r, count - 1) * stride;
-            };
-            four_rows(row(0), row(1), row(2), row(3), panel_values.data() + panel * n * kBands, n,
-                      sums);
-            const Eigen::Index bands = std::min(kBands, m - panel * kBands);
-            for (Eigen::Index r = 0; r < kRows && first + r < count; ++r)
-              std::copy_n(sums + r * kBands, bands, y.data() + (first + r) * m + panel * kBands);
-          }
-      });
+BandMatrix product_of_rows(const double* rows, Index count, Index stride, const BandMatrix& x) {
+  if (count < kMostRows) {  // less than a tile
+    BandMatrix padded = BandMatrix::Zero(kMostRows, stride);
+    std::copy_n(rows, count * stride, padded.data());
+    return product_of_rows(padded.data(), kMostRows, stride, x).topRows(count);
+  }
+  const std::vector<Group> groups = groups_of(x);
+  BandMatrix y(count, x.cols());
+  tbb::parallel_for(tbb::blocked_range<Index>(0, (count + kTaskRows - 1) / kTaskRows, 1),
+                    [&](const auto& range) {
+                      const Index begin = range.begin() * kTaskRows;
+                      const Index end = std::min(range.end() * kTaskRows, count);
+                      for (Index at = begin; at < end; at += kTaskRows)
+                        for (const Group& group : groups)
+                          multiply_rows(rows, stride, at, std::min(at + kTaskRows, end), group, y);
+                    });
   return y;
 }
 

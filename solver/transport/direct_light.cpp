@@ -10,6 +10,8 @@
 #include <mutex>
 #include <span>
 
+#include "transport/enclosure.h"
+
 namespace truebox {
 namespace {
 
@@ -156,6 +158,26 @@ BandMatrix mean_direct(const PatchMesh& mesh, const Scene& scene, const Gather& 
     progress("direct light", static_cast<double>(count) / static_cast<double>(tasks.size()));
   });
   return direct;
+}
+
+Eigen::RowVectorXd mean_direct_of_free_part(const PatchMesh& mesh, const Scene& scene,
+                                            const Gather& gather, const Visibility& visibility,
+                                            std::uint32_t patch) {
+  constexpr int kPoints = 16;  // squared
+  const Vec3& normal = mesh.plane_of(mesh.patches[patch]).normal;
+  Polygon polygon;
+  mesh.polygon_of(mesh.patches[patch], polygon);
+  Gather::Scratch scratch;
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(scene.bands.size()));
+  int free = 0;
+  for (int k = 0; k < kPoints * kPoints; ++k) {
+    const Vec3 point =
+        sample_polygon(polygon, (k / kPoints + 0.5) / kPoints, (k % kPoints + 0.5) / kPoints);
+    if (!is_free(mesh, scene, visibility, patch, point)) continue;
+    gather.add_direct(point, normal, sum, scratch);
+    ++free;
+  }
+  return sum.transpose() / std::max(1, free);
 }
 
 LitElements::LitElements(const PatchMesh& mesh, const Scene& scene, const ElementTree& tree,

@@ -4,6 +4,7 @@
 #include "radiometry/progress.h"
 #include "transport/element_tree.h"
 #include "transport/gather.h"
+#include "transport/visibility.h"
 
 namespace truebox {
 
@@ -14,6 +15,12 @@ namespace truebox {
 BandMatrix mean_direct(const PatchMesh& mesh, const Scene& scene, const Gather& gather,
                        const ElementTree& tree, const ShaftCulling& culling,
                        const Progress& progress = {});
+
+/// The same over the part of an element of a closed scene that no surface covers: mean over those
+/// of 256 evenly spread points. 0 where none of them is free.
+Eigen::RowVectorXd mean_direct_of_free_part(const PatchMesh& mesh, const Scene& scene,
+                                            const Gather& gather, const Visibility& visibility,
+                                            std::uint32_t patch);
 
 /// Which lamps each element may see, and what may stand between: found once, asked at many points.
 class LitElements {

@@ -16,8 +16,8 @@ double unit_interval(std::uint64_t bits);  ///< the upper 53 bits as a number in
 /// square-root map.
 Vec3 sample_polygon(const Polygon& polygon, double u, double v);
 
-/// Whether an element whose row of form factors is empty lies under another surface: a ray from its
-/// centroid meets the back of a surface at once, or a surface of opposite normal lies on it.
+/// Whether an element whose row of form factors is (nearly) empty lies under another surface: one
+/// of opposite normal lies on it, or all of many cosine-distributed rays meet backs of surfaces.
 bool is_buried(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
                std::size_t patch);
 
@@ -31,9 +31,25 @@ std::vector<char> usable_patches(const PatchMesh& mesh, const Scene& scene,
 inline constexpr double kEmptyRow = 1e-4;
 /// The same where rows are exact: at a block's outline what lies under it sees slivers.
 inline constexpr double kNearlyEmptyRow = 0.1;
-/// Exact rows of a closed scene that miss 1 by more than this lie partly under another surface:
-/// what is missing there is not an error of the factors.
-inline constexpr double kPartlyBuriedRow = 0.1;
+/// Exact rows of a closed scene that miss 1 by more than this are wrong for another reason than
+/// their visibility's quadrature: they are not scaled.
+inline constexpr double kUnmendableRow = 0.1;
+
+/// Whether an element lies partly under another surface: its row lacks some of 1 in a closed scene,
+/// and a surface crosses it. What its row sums to is then the area that is free, m^2: the element
+/// counts with that, radiosity and irradiance are those of the free part.
+bool is_partly_covered(const PatchMesh& mesh, const Scene& scene, std::size_t patch,
+                       double row_sum);
+
+/// One flag an element: usable, not partly covered, and its row not empty. Those are what can tell
+/// whether the scene is closed: parts of a sunken block look out from below the floor.
+std::vector<char> whole_patches(const PatchMesh& mesh, const Scene& scene,
+                                const std::vector<char>& usable, const Eigen::VectorXd& row_sums);
+
+/// Whether a point of an element of a closed scene is free: a ray along its normal meets a lit
+/// side, and no surface of opposite normal lies on it.
+bool is_free(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+             std::size_t patch, const Vec3& point);
 
 /// Cosine-distributed rays, 16 from every usable element: the scene is closed if none escapes.
 struct ClosureTest {

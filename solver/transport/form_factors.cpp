@@ -29,6 +29,21 @@ struct PatchShape {
 
 constexpr int kSampleWindows = 64;
 
+void leave_out(FormFactors& factors, Eigen::Index i) {
+  factors.usable[static_cast<std::size_t>(i)] = 0;
+  ++factors.summary.buried_patches;
+  factors.exchange_area_m2.col(i).setZero();
+  factors.exchange_area_m2.row(i).setZero();
+}
+
+// In a closed scene what sees nothing lies outside of it, as below the floor that a block is sunk
+// into.
+void leave_out_outside(FormFactors& factors, const Eigen::VectorXd& row_sums) {
+  for (Eigen::Index i = 0; i < factors.size(); ++i)
+    if (factors.usable[static_cast<std::size_t>(i)] && row_sums[i] < kEmptyRow)
+      leave_out(factors, i);
+}
+
 class Builder {
  public:
   Builder(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
@@ -67,11 +82,23 @@ class Builder {
     result.summary.pairs_sampled = partial_;
     result.summary.rays = rays_;
     mark_buried(result);
-    const ClosureTest closure =
-        test_closure(mesh_, scene_, visibility_, result.usable, options_.seed);
+    const Eigen::VectorXd row_sums =
+        result.exchange_area_m2.colwise().sum().transpose().cwiseQuotient(result.area_m2);
+    whole_ = whole_patches(mesh_, scene_, result.usable, row_sums);
+    const ClosureTest closure = test_closure(mesh_, scene_, visibility_, whole_, options_.seed);
     result.summary.closed = closure.closed;
     result.summary.closure_rays = closure.rays;
-    if (result.summary.closed) repair(result);
+    if (result.summary.closed) {
+      leave_out_outside(result, row_sums);
+      // Noise makes some of these whole: their free part comes out wrong by as much.
+      std::vector<Eigen::Index> covered;
+      for (Eigen::Index i = 0; i < n; ++i)
+        if (result.usable[static_cast<std::size_t>(i)] && !whole_[static_cast<std::size_t>(i)])
+          covered.push_back(i);
+      result.summary.covered_patches = covered.size();
+      repair(result);
+      for (Eigen::Index i : covered) result.area_m2[i] = result.exchange_area_m2.col(i).sum();
+    }
     result.summary.row_sum_max = 0.0;
     for (Eigen::Index i = 0; i < n; ++i)
       result.summary.row_sum_max = std::max(
@@ -239,7 +266,7 @@ class Builder {
       double change = 0.0;
       for (Eigen::Index i = 0; i < n; ++i) {
         // Rows whose sampled share is tiny cannot be mended through it.
-        if (!factors.usable[i] || noisy[i] < 1e-3 * factors.area_m2[i]) continue;
+        if (!whole_[static_cast<std::size_t>(i)] || noisy[i] < 1e-3 * factors.area_m2[i]) continue;
         const double wanted = std::clamp((factors.area_m2[i] - exact[i]) / noisy[i], 0.5, 2.0);
         const double next = std::sqrt(x[i] * wanted);
         change = std::max(change, std::abs(next - x[i]));
@@ -254,16 +281,16 @@ class Builder {
       factors.exchange_area_m2(i, j) = factors.exchange_area_m2(j, i);
     });
     for (Eigen::Index i = 0; i < n; ++i)
-      if (factors.usable[i])
+      if (whole_[static_cast<std::size_t>(i)])
         factors.summary.closure_residual_max =
             std::max(factors.summary.closure_residual_max,
                      std::abs(factors.exchange_area_m2.col(i).sum() / factors.area_m2[i] - 1.0));
   }
 
-  static void record_closure(FormFactors& factors, const Eigen::VectorXd& row_sums) {
+  void record_closure(FormFactors& factors, const Eigen::VectorXd& row_sums) const {
     double weighted = 0.0, area = 0.0;
     for (Eigen::Index i = 0; i < factors.size(); ++i) {
-      if (!factors.usable[i]) continue;
+      if (!whole_[static_cast<std::size_t>(i)]) continue;
       const double error = std::abs(row_sums[i] / factors.area_m2[i] - 1.0);
       factors.summary.closure_error_max = std::max(factors.summary.closure_error_max, error);
       weighted += error * factors.area_m2[i];
@@ -279,6 +306,7 @@ class Builder {
   double tolerance_m_ = 0.0;
   std::vector<PatchShape> shapes_;
   std::vector<std::uint32_t> blockers_;
+  std::vector<char> whole_;  // neither buried nor partly covered
   std::vector<Eigen::AlignedBox3d> boxes_;
   std::vector<Sides> piece_sides_;
   std::vector<std::vector<std::uint32_t>> sampled_;  // pairs i < j whose share came from rays
@@ -317,29 +345,36 @@ FormFactors without_rays(const PatchMesh& mesh, const Scene& scene, const Visibi
   summary.pairs_hidden = exact.pairs_hidden;
   summary.pairs_sampled = exact.pairs_partial;
   for (Eigen::Index i = 0; i < result.size(); ++i) {
-    char& usable = result.usable[static_cast<std::size_t>(i)];
-    if (result.exchange_area_m2.col(i).sum() < kNearlyEmptyRow * result.area_m2[i])
-      usable = !is_buried(mesh, scene, visibility, static_cast<std::size_t>(i));
-    if (usable) continue;
-    ++summary.buried_patches;
-    result.exchange_area_m2.col(i).setZero();
-    result.exchange_area_m2.row(i).setZero();
+    const auto k = static_cast<std::size_t>(i);
+    result.usable[k] = 1;
+    if (result.exchange_area_m2.col(i).sum() < kNearlyEmptyRow * result.area_m2[i] &&
+        is_buried(mesh, scene, visibility, k))
+      leave_out(result, i);
   }
-  const ClosureTest closure = test_closure(mesh, scene, visibility, result.usable, options.seed);
+  const Eigen::VectorXd row_sums =
+      result.exchange_area_m2.colwise().sum().transpose().cwiseQuotient(result.area_m2);
+  const std::vector<char> tested = whole_patches(mesh, scene, result.usable, row_sums);
+  const ClosureTest closure = test_closure(mesh, scene, visibility, tested, options.seed);
   summary.closed = closure.closed;
   summary.closure_rays = closure.rays;
   if (summary.closed) {
+    leave_out_outside(result, row_sums);
     std::vector<char> whole = result.usable;
-    for (Eigen::Index i = 0; i < result.size(); ++i)
-      if (std::abs(result.exchange_area_m2.col(i).sum() / result.area_m2[i] - 1.0) >
-          kPartlyBuriedRow)
-        whole[static_cast<std::size_t>(i)] = 0;
+    std::vector<Eigen::Index> covered;
+    for (Eigen::Index i = 0; i < result.size(); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (!whole[k]) continue;
+      if (!tested[k]) covered.push_back(i);
+      if (!tested[k] || std::abs(row_sums[i] - 1.0) > kUnmendableRow) whole[k] = 0;
+    }
     const ClosureReport report = repair_closure(result.exchange_area_m2, result.area_m2, whole,
                                                 exact.partial, ClosureRepair::scaling);
     summary.closure_error_max = report.error_before_max;
     summary.closure_error_mean = report.error_before_rms;
     summary.repair_max = report.change_max;
     summary.closure_residual_max = report.error_after_max;
+    for (Eigen::Index i : covered) result.area_m2[i] = result.exchange_area_m2.col(i).sum();
+    summary.covered_patches = covered.size();
   }
   summary.row_sum_max = 0.0;
   for (Eigen::Index i = 0; i < result.size(); ++i)

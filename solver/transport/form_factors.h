@@ -34,8 +34,9 @@ struct FormFactorSummary {
   FormFactorMethod method = FormFactorMethod::exact_visibility;
   std::size_t pairs_unoccluded = 0, pairs_hidden = 0, pairs_sampled = 0;
   std::size_t rays = 0;
-  std::size_t buried_patches = 0;  ///< lie under another surface and see nothing
-  bool closed = false;             ///< no ray of the closure test escaped
+  std::size_t buried_patches = 0;   ///< lie under another surface and see nothing
+  std::size_t covered_patches = 0;  ///< lie partly under one: their free part counts
+  bool closed = false;              ///< no ray of the closure test escaped
   std::size_t closure_rays = 0;
   double closure_error_max = 0.0;     ///< max |sum_j F_ij - 1| before repair (closed scenes)
   double closure_error_mean = 0.0;    ///< its area-weighted mean; root mean square without rays
@@ -49,7 +50,7 @@ struct FormFactorSummary {
 /// that reciprocity holds by construction.
 struct FormFactors {
   Eigen::MatrixXd exchange_area_m2;
-  Eigen::VectorXd area_m2;
+  Eigen::VectorXd area_m2;   ///< what is free of each element, all of it but for few
   std::vector<char> usable;  ///< 0: buried
   FormFactorSummary summary;
 

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "scene/requirements.h"
+#include "transport/enclosure.h"
 #include "transport/moment_integrals.h"
 #include "transport/quadrature.h"
 
@@ -42,13 +43,16 @@ GalerkinSystem::GalerkinSystem(const PatchMesh& mesh, const Scene& scene,
                                const GalerkinOptions& options)
     : options_(options), surface_count_(scene.surfaces.size()) {
   if (const std::string why = options.invalid(); !why.empty()) throw std::invalid_argument(why);
-  if (requirements(scene).occlusion)
-    throw std::invalid_argument(
-        "polynomial elements need a scene in which no surface can come between two others");
+  std::unique_ptr<Visibility> rays;
+  if (requirements(scene).occlusion) {
+    visible_ = std::make_shared<VisibleMoments>(mesh, scene);
+    rays = std::make_unique<Visibility>(mesh, scene);
+  }
   Polygon polygon;
-  for (const Patch& patch : mesh.patches) {
+  for (std::size_t p = 0; p < mesh.size(); ++p) {
+    const Patch& patch = mesh.patches[p];
     const std::size_t surface = mesh.surface_of(patch);
-    if (scene.surfaces[surface].is_opening) continue;
+    if (scene.surfaces[surface].is_opening || (rays && is_buried(mesh, scene, *rays, p))) continue;
     mesh.polygon_of(patch, polygon);
     for (PolynomialElement& element : polynomial_elements(polygon, options.degree)) {
       elements_.push_back(std::move(element));
@@ -76,12 +80,20 @@ void GalerkinSystem::integrate_kernel() {
   tbb::parallel_for(std::size_t{0}, elements_.size(), [&](std::size_t i) {
     for (std::size_t j = 0; j < i; ++j) {
       if (!sees(elements_[i], elements_[j]) || !sees(elements_[j], elements_[i])) continue;
-      const Eigen::MatrixXd block =
-          exchange_moments(elements_[i], elements_[j], options_.relative_tolerance);
+      const Eigen::MatrixXd block = moments_of(elements_[i], elements_[j]);
       k.block(first_[i], first_[j], block.rows(), block.cols()) = block;
       k.block(first_[j], first_[i], block.cols(), block.rows()) = block.transpose();
     }
   });
+}
+
+Eigen::MatrixXd GalerkinSystem::moments_of(const PolynomialElement& i,
+                                           const PolynomialElement& j) const {
+  if (visible_) {
+    const auto between = visible_->between(i, j);
+    if (!between.empty() || !faces_wholly(i, j)) return visible_->exchange(i, j, between);
+  }
+  return exchange_moments(i, j, options_.relative_tolerance);
 }
 
 std::vector<Index> GalerkinSystem::unknowns_of_degree(int degree) const {
@@ -99,6 +111,7 @@ GalerkinSystem GalerkinSystem::at_degree(int degree) const {
   if (const std::string why = lower.options_.invalid(); !why.empty() || degree > options_.degree)
     throw std::invalid_argument("degree must lie in [0, " + std::to_string(options_.degree) + "]");
   lower.surface_count_ = surface_count_;
+  lower.visible_ = visible_;
   lower.surface_ = surface_;
   for (std::size_t e = 0; e < elements_.size(); ++e) {
     const auto& c = elements_[e].corners();
@@ -188,16 +201,44 @@ Eigen::MatrixXd GalerkinSystem::gathered(std::size_t e, const std::vector<Vec3>&
   Eigen::VectorXd moments;
   for (std::size_t j = 0; j < elements_.size(); ++j) {
     if (!sees(elements_[e], elements_[j]) || !sees(elements_[j], elements_[e])) continue;
+    std::vector<const Blocker*> between;
+    if (visible_) between = visible_->between(elements_[e], elements_[j]);
+    const bool is_clear =
+        !visible_ || (between.empty() && faces_wholly(elements_[e], elements_[j]));
     for (std::size_t p = 0; p < points.size(); ++p) {
       moments.setZero(elements_[j].functions());
-      add_gathered_moments(points[p], elements_[e].normal(), elements_[j],
-                           options_.relative_tolerance, moments.data());
+      if (is_clear)
+        add_gathered_moments(points[p], elements_[e].normal(), elements_[j],
+                             options_.relative_tolerance, moments.data());
+      else
+        visible_->add_gathered(points[p], elements_[e].normal(), elements_[j], between,
+                               moments.data());
       sum.row(static_cast<Index>(p)).noalias() +=
           moments.transpose() * coefficients.middleRows(first_[j], moments.size());
     }
   }
   return sum;
 }
+
+namespace {
+
+// Points and weights of a rule that crowds towards the edges, and every function at each point.
+void crowded_points(const PolynomialElement& element, std::vector<Vec3>& points,
+                    std::vector<double>& weights, Eigen::MatrixXd& phi) {
+  const GaussRule& rule = gauss_rule(kResidualPoints);
+  phi.resize(element.functions(), kResidualPoints * kResidualPoints);
+  const auto crowd = [](double t) { return t * t * (3.0 - 2.0 * t); };
+  for (int l = 0; l < kResidualPoints; ++l)
+    for (int k = 0; k < kResidualPoints; ++k) {
+      const double s = rule.nodes[l], t = rule.nodes[k], u = crowd(s), v = crowd(t);
+      element.evaluate(u, v, phi.col(static_cast<Index>(points.size())).data());
+      weights.push_back(rule.weights[l] * rule.weights[k] * 36.0 * s * (1 - s) * t * (1 - t) *
+                        element.jacobian_m2(u));
+      points.push_back(element.at(u, v));
+    }
+}
+
+}  // namespace
 
 BandMatrix GalerkinSystem::mean_error_bound(const BandMatrix& reflectance,
                                             const BandMatrix& exitance,
@@ -207,50 +248,52 @@ BandMatrix GalerkinSystem::mean_error_bound(const BandMatrix& reflectance,
   for (std::size_t e = 0; e < elements_.size(); ++e)
     area[static_cast<Index>(surface_[e])] += elements_[e].area_m2();
   BandMatrix bound = BandMatrix::Zero(n, bands);
+  // Columns of each band: 0 radiosity, 1 + s the solution for the mean of surface s.
+  BandMatrix solved(unknowns(), bands * (n + 1));
+  BandMatrix source = BandMatrix::Zero(n, solved.cols());  // rho times the right-hand sides
   for (Index band = 0; band < bands; ++band) {
-    // Column 0: radiosity. Column 1 + s: the solution for the mean of surface s.
+    const Index first = band * (n + 1);
+    source.col(first) = exitance.col(band);
+    for (Index s = 0; s < n; ++s)
+      if (area[s] > 0.0) source(s, first + s + 1) = reflectance(s, band) / area[s];
     const BandMatrix rho = reflectance.col(band).replicate(1, n + 1);
-    BandMatrix source = BandMatrix::Zero(n, n + 1);  // rho times the right-hand side of A z = ...
-    source.col(0) = exitance.col(band);
-    for (Index s = 0; s < n; ++s)
-      if (area[s] > 0.0) source(s, s + 1) = rho(s, 0) / area[s];
-    BandMatrix solved;
-    solve(rho, project_constants(source), solved);
-    solved.col(0) = coefficients.col(band);
-
-    Eigen::MatrixXd products = Eigen::MatrixXd::Zero(n + 1, n + 2);  // <s_a, s_b>; <z_a, s_0>
-    std::vector<Eigen::MatrixXd> part(elements_.size(), products);
-    tbb::parallel_for(std::size_t{0}, elements_.size(), [&](std::size_t e) {
-      const double reflected = rho(static_cast<Index>(surface_[e]), 0);
-      if (reflected == 0.0) return;  // B = M there, and so is B~
-      const GaussRule& rule = gauss_rule(kResidualPoints);
-      std::vector<Vec3> points;
-      std::vector<double> weights;
-      Eigen::MatrixXd phi(elements_[e].functions(), kResidualPoints * kResidualPoints);
-      const auto crowd = [](double t) { return t * t * (3.0 - 2.0 * t); };
-      for (int l = 0; l < kResidualPoints; ++l)
-        for (int k = 0; k < kResidualPoints; ++k) {
-          const double s = rule.nodes[l], t = rule.nodes[k], u = crowd(s), v = crowd(t);
-          elements_[e].evaluate(u, v, phi.col(static_cast<Index>(points.size())).data());
-          weights.push_back(rule.weights[l] * rule.weights[k] * 36.0 * s * (1 - s) * t * (1 - t) *
-                            elements_[e].jacobian_m2(u));
-          points.push_back(elements_[e].at(u, v));
-        }
-      const Eigen::MatrixXd in = gathered(e, points, solved);
-      const Eigen::MatrixXd own = phi.transpose() * solved.middleRows(first_[e], phi.rows());
+    BandMatrix of_band;
+    solve(rho, project_constants(source.middleCols(first, n + 1)), of_band);
+    of_band.col(0) = coefficients.col(band);
+    solved.middleCols(first, n + 1) = of_band;
+  }
+  // Of each column: <s, s> and <z, s_0>, s_0 the radiosity's residual in its band.
+  std::vector<Eigen::MatrixXd> part(elements_.size(), Eigen::MatrixXd::Zero(solved.cols(), 2));
+  tbb::parallel_for(std::size_t{0}, elements_.size(), [&](std::size_t e) {
+    const Index surface = static_cast<Index>(surface_[e]);
+    if ((reflectance.row(surface).array() == 0.0).all()) return;  // B = M there, and so is B~
+    std::vector<Vec3> points;
+    std::vector<double> weights;
+    Eigen::MatrixXd phi;
+    crowded_points(elements_[e], points, weights, phi);
+    const Eigen::MatrixXd in = gathered(e, points, solved);
+    const Eigen::MatrixXd own = phi.transpose() * solved.middleRows(first_[e], phi.rows());
+    for (Index c = 0; c < solved.cols(); ++c) {
+      const double rho = reflectance(surface, c / (n + 1));
+      if (rho == 0.0) continue;
+      const Index c0 = c - c % (n + 1);
       for (Index p = 0; p < in.rows(); ++p) {
-        const Eigen::RowVectorXd s = source.row(static_cast<Index>(surface_[e])) / reflected +
-                                     in.row(p) - own.row(p) / reflected;
         const double w = weights[static_cast<std::size_t>(p)];
-        part[e].leftCols(n + 1).diagonal() += w * s.transpose().cwiseAbs2();
-        part[e].col(n + 1) += w * s[0] * own.row(p).transpose();
+        const double r = (source(surface, c) - own(p, c)) / rho + in(p, c);
+        const double r0 = (source(surface, c0) - own(p, c0)) / rho + in(p, c0);
+        part[e](c, 0) += w * r * r;
+        part[e](c, 1) += w * r0 * own(p, c);
       }
-    });
-    for (const Eigen::MatrixXd& p : part) products += p;
+    }
+  });
+  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(solved.cols(), 2);
+  for (const Eigen::MatrixXd& p : part) products += p;
+  for (Index band = 0; band < bands; ++band) {
     const double gap = 1.0 / reflectance.col(band).maxCoeff() - 1.0;
+    const Index first = band * (n + 1);
     for (Index s = 0; s < n; ++s)
-      bound(s, band) = std::abs(products(s + 1, n + 1)) +
-                       std::sqrt(products(0, 0) * products(s + 1, s + 1)) / gap;
+      bound(s, band) = std::abs(products(first + s + 1, 1)) +
+                       std::sqrt(products(first, 0) * products(first + s + 1, 0)) / gap;
   }
   return bound;
 }

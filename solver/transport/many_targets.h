@@ -6,6 +6,8 @@
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define TRUEBOX_MANY_TARGETS \
   __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+/// For the widest alone: to be called only where __builtin_cpu_supports("avx512f").
+#define TRUEBOX_WIDE_VECTORS __attribute__((target("avx512f")))
 #else
 #define TRUEBOX_MANY_TARGETS
 #endif

@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "transport/polygon_rule.h"
+#include "transport/shaft_culling.h"
 
 namespace truebox {
 namespace {
@@ -34,9 +35,10 @@ class NearSources {
         gather_(gather),
         usable_(usable),
         direct_share_(direct_share),
-        rest_(rest) {
-    Polygon polygon;
+        rest_(rest),
+        culling_(mesh, scene, true) {
     for (const Patch& patch : mesh.patches) {
+      Polygon& polygon = polygons_.emplace_back();
       mesh.polygon_of(patch, polygon);
       double radius_m = 0.0;
       for (const Vec3& v : polygon) radius_m = std::max(radius_m, (v - patch.centroid).norm());
@@ -68,14 +70,26 @@ class NearSources {
     BandMatrix correction = BandMatrix::Zero(n, rest_.cols());
     tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, n, 16), [&](const auto& range) {
       Gather::Scratch scratch;
+      std::vector<std::uint32_t> stack;
       for (std::uint32_t i = range.begin(); i < range.end(); ++i)
-        for (std::uint32_t j : near[i])
-          correction.row(i) += received(i, j, sources[j], scratch) / mesh_.patches[i].area_m2;
+        for (std::uint32_t j : near[i]) {
+          stack = culling_.blockers();
+          const std::size_t to = stack.size();
+          if (!culling_.keep_between(end_of(i), end_of(j), stack, 0, to)) continue;
+          correction.row(i) += received(i, j, sources[j], std::span(stack).subspan(to), scratch) /
+                               mesh_.patches[i].area_m2;
+        }
     });
     return correction;
   }
 
  private:
+  ShaftEnd end_of(std::uint32_t patch) const {
+    ShaftEnd end{polygons_[patch], mesh_.plane_of(mesh_.patches[patch]), {}, true};
+    for (const Vec3& v : polygons_[patch]) end.box.extend(v);
+    return end;
+  }
+
   bool reflects(std::size_t surface) const {
     const auto& rho = scene_.material_of(scene_.surfaces[surface]).reflectance.values;
     return std::any_of(rho.begin(), rho.end(), [](double value) { return value > 0.0; });
@@ -103,10 +117,8 @@ class NearSources {
 
   Source make_source(std::uint32_t j, const SmoothField& field, Gather::Scratch& scratch) const {
     const Patch& patch = mesh_.patches[j];
-    Polygon polygon;
-    mesh_.polygon_of(patch, polygon);
     Source source;
-    for_each_gauss_point(polygon, kRulePoints, [&](const Vec3& point, double weight) {
+    for_each_gauss_point(polygons_[j], kRulePoints, [&](const Vec3& point, double weight) {
       source.points.push_back(point);
       source.weight_m2.push_back(weight * patch.area_m2);
     });
@@ -126,17 +138,16 @@ class NearSources {
     return source;
   }
 
-  // W nm^-1 beyond what a source of constant brightness sends.
+  // W nm^-1 beyond what a source of constant brightness sends; pieces `between` may hide a part.
   Eigen::RowVectorXd received(std::uint32_t i, std::uint32_t j, const Source& source,
+                              std::span<const std::uint32_t> between,
                               Gather::Scratch& scratch) const {
     const Patch& patch = mesh_.patches[i];
-    Polygon polygon;
-    mesh_.polygon_of(patch, polygon);
     const Vec3& normal = mesh_.plane_of(mesh_.patches[j]).normal;
     Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(rest_.cols());
     for (std::size_t k = 0; k < source.points.size(); ++k) {
-      const double factor =
-          gather_.visible_factor(source.points[k], normal, polygon, patch.piece, scratch);
+      const double factor = gather_.visible_factor(source.points[k], normal, polygons_[i],
+                                                   patch.piece, between, scratch);
       if (factor > 0.0)
         sum += source.weight_m2[k] * factor * source.excess.row(static_cast<Index>(k));
     }
@@ -149,6 +160,8 @@ class NearSources {
   const std::vector<char>& usable_;
   const BandMatrix& direct_share_;
   const BandMatrix& rest_;
+  ShaftCulling culling_;
+  std::vector<Polygon> polygons_;
   std::vector<double> radius_m_;
   double largest_m_ = 0.0;
   std::vector<Eigen::AlignedBox3d> boxes_;  // of the pieces

@@ -17,9 +17,9 @@ std::vector<SurfaceFlux> net_fluxes(const Prediction& prediction) {
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     if (!prediction.fine().usable[i]) continue;
     const std::size_t surface = mesh.surface_of(mesh.patches[i]);
-    incident[surface] +=
-        mesh.patches[i].area_m2 * irradiance.row(static_cast<Index>(i)).transpose();
-    area[surface] += mesh.patches[i].area_m2;
+    const double free_m2 = prediction.fine().free_area_m2[static_cast<Index>(i)];
+    incident[surface] += free_m2 * irradiance.row(static_cast<Index>(i)).transpose();
+    area[surface] += free_m2;
   }
   for (std::size_t s = 0; s < scene.surfaces.size(); ++s) {
     if (scene.surfaces[s].is_opening) continue;

@@ -27,8 +27,9 @@ double largest_relative_bound(const Prediction& prediction) {
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     if (!prediction.fine().usable[i]) continue;
     const auto surface = static_cast<Index>(mesh.surface_of(mesh.patches[i]));
-    mean.row(surface) += mesh.patches[i].area_m2 * irradiance.row(static_cast<Index>(i));
-    area[surface] += mesh.patches[i].area_m2;
+    const double free_m2 = prediction.fine().free_area_m2[static_cast<Index>(i)];
+    mean.row(surface) += free_m2 * irradiance.row(static_cast<Index>(i));
+    area[surface] += free_m2;
   }
   double largest = 0.0;
   for (Index s = 0; s < bound.rows(); ++s) {

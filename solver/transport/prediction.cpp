@@ -29,6 +29,13 @@ BandMatrix reflectance_of(const PatchMesh& mesh, const Scene& scene) {
   return rho;
 }
 
+Eigen::VectorXd areas_of(const PatchMesh& mesh) {
+  Eigen::VectorXd area_m2(static_cast<Index>(mesh.size()));
+  for (Index i = 0; i < area_m2.size(); ++i)
+    area_m2[i] = mesh.patches[static_cast<std::size_t>(i)].area_m2;
+  return area_m2;
+}
+
 FoundExchange full_matrix(const ExchangeRequest& request) {
   auto factors = std::make_unique<FormFactors>(
       form_factors(request.mesh, request.scene, request.visibility, request.options));
@@ -76,6 +83,7 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
                                                            const PredictOptions& options) const {
   auto level = std::make_unique<Level>();
   level->split = split;
+  level->reconstruction = options.reconstruction;
   GridSolution& grid = level->solution;
   grid.mesh = mesh_of(edge_m, split, options);
   const auto bands = static_cast<Index>(distinct_scene_.bands.size());
@@ -85,7 +93,8 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   grid.direct =
       mean_direct(grid.mesh, distinct_scene_, *level->gather, tree, culling, options.progress);
   const BandMatrix rho = reflectance_of(grid.mesh, distinct_scene_);
-  const BandMatrix source = rho.cwiseProduct(grid.direct);
+  BandMatrix source = rho.cwiseProduct(grid.direct);
+  grid.free_area_m2 = areas_of(grid.mesh);
   if (!needs_.interreflection) {
     grid.usable.assign(grid.mesh.size(), 1);
     grid.indirect = BandMatrix::Zero(rho.rows(), bands);
@@ -98,7 +107,17 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   factor_options.occlusion = needs_.occlusion;
   factor_options.seed = options.form_factors.seed + static_cast<std::uint64_t>(split);
   factor_options.progress = options.progress;
-  GridTask task{distinct_scene_, rho, source, factor_options, options.solve, {}};
+  const Visibility visibility(grid.mesh, distinct_scene_);
+  GridTask task{distinct_scene_, rho, source, factor_options, options.solve, {}, {}};
+  task.take_free_areas = [&](const Eigen::VectorXd& free_area_m2) {
+    for (Index i = 0; i < free_area_m2.size(); ++i) {
+      if (free_area_m2[i] == grid.free_area_m2[i]) continue;
+      grid.direct.row(i) = mean_direct_of_free_part(grid.mesh, distinct_scene_, *level->gather,
+                                                    visibility, static_cast<std::uint32_t>(i));
+      source.row(i) = rho.row(i).cwiseProduct(grid.direct.row(i));
+    }
+    grid.free_area_m2 = free_area_m2;
+  };
   if (options.near_sources.value_or(false))
     task.near_sources = [&](const GridSolution& first) {
       return near_source_correction(first.mesh, distinct_scene_, *level->gather, first.usable, rho,
@@ -108,11 +127,11 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
     options.solve_grid(task, grid);
     return level;
   }
-  const Visibility visibility(grid.mesh, distinct_scene_);
   const FindExchange find = options.find_exchange ? options.find_exchange : full_matrix;
   FoundExchange found =
       find({grid.mesh, distinct_scene_, visibility, culling, rho, source, factor_options});
   grid.usable = std::move(found.usable);
+  task.take_free_areas(found.exchange->area_m2());
   grid.form_factors = found.summary;
   grid.links = found.links;
   if (found.links) task.near_sources = {};  // they split bright sources themselves
@@ -170,6 +189,22 @@ const SmoothField& Prediction::Level::smooth() const {
   return *smooth_field;
 }
 
+void Prediction::Level::evaluate(std::uint32_t patch, const Vec3& point,
+                                 Eigen::Ref<Eigen::VectorXd> value) const {
+  if (reconstruction == Reconstruction::smooth) return smooth().evaluate(patch, point, value);
+  if (reconstruction == Reconstruction::constant) {
+    value = solution.indirect.row(patch).transpose();
+    return;
+  }
+  std::call_once(vertices_once, [this] {
+    vertices = std::make_unique<VertexRadiosity>(solution.mesh, solution.usable, solution.indirect,
+                                                 reconstruction == Reconstruction::averaged
+                                                     ? VertexRule::averaged
+                                                     : VertexRule::least_squares);
+  });
+  vertices->evaluate(patch, point, value);
+}
+
 const GatheredField& Prediction::Level::gathered(const Scene& scene, bool occlusion) const {
   std::call_once(gathered_once, [&] {
     gathered_field = std::make_unique<GatheredField>(FieldSources{
@@ -219,8 +254,9 @@ void Prediction::differentiate(const ExchangeOperator& exchange, const GridTask&
     for (std::size_t i = 0; i < grid.mesh.size(); ++i) {
       if (!grid.usable[i]) continue;
       const auto s = static_cast<Index>(grid.mesh.surface_of(grid.mesh.patches[i]));
-      mean.row(s) += grid.mesh.patches[i].area_m2 * derivative.row(static_cast<Index>(i));
-      area[s] += grid.mesh.patches[i].area_m2;
+      mean.row(s) +=
+          grid.free_area_m2[static_cast<Index>(i)] * derivative.row(static_cast<Index>(i));
+      area[s] += grid.free_area_m2[static_cast<Index>(i)];
     }
     for (Index s = 0; s < surfaces; ++s)
       if (area[s] > 0.0) mean.row(s) /= area[s];
@@ -282,7 +318,7 @@ BandMatrix Prediction::indirect_from_surfaces(const Level& level, const Vec3& po
       value =
           indirect_from_surfaces(level, at, piece.plane.normal, true).colwise().sum().transpose();
     else
-      level.smooth().evaluate(patch, at, value);
+      level.evaluate(patch, at, value);
     level.gather->add_direct(at, piece.plane.normal, value, source_scratch);
     value = value.cwiseProduct(
         Eigen::Map<const Eigen::VectorXd>(rho.data(), static_cast<Index>(rho.size())));
@@ -323,7 +359,7 @@ BoundedIrradiance Prediction::irradiance_on(std::uint32_t piece, const Vec3& poi
       bound = gathered_bound().row(cell).transpose();
       best_field_->evaluate(cell, point, value);
     } else {
-      levels_[0]->smooth().evaluate(patch, point, value);
+      levels_[0]->evaluate(patch, point, value);
       bound = indirect_bound().row(patch).transpose();
     }
   }

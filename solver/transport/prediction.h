@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "mesh/smooth_field.h"
+#include "mesh/vertex_radiosity.h"
 #include "scene/requirements.h"
 #include "transport/form_factors.h"
 #include "transport/found_exchange.h"
@@ -28,6 +29,9 @@ struct GridTask {
   const BandMatrix& source;
   const FormFactorOptions& form_factors;
   const SolveOptions& solve;
+  /// To be told what is free of each element, m^2, before `source` is used: direct light of those
+  /// that are partly covered becomes that of their free part.
+  std::function<void(const Eigen::VectorXd& free_area_m2)> take_free_areas;
   /// What element means lack because near elements are not of one brightness, elements x bands,
   /// from a first solution; empty if that is not wanted. See near_source_correction.
   std::function<BandMatrix(const GridSolution& first)> near_sources;
@@ -41,6 +45,14 @@ using SolveGrid = std::function<void(const GridTask& task, GridSolution& grid)>;
 void solve_with_near_sources(
     const GridTask& task, GridSolution& grid,
     const std::function<void(const BandMatrix& source, const SolveOptions& options)>& solve);
+
+/// How element means become values at points.
+enum class Reconstruction {
+  smooth,        ///< quadratics on each piece of surface: SmoothField
+  constant,      ///< the mean itself
+  averaged,      ///< vertices: mean of the elements around, extrapolated at borders
+  least_squares  ///< vertices: the plane through the elements around; both VertexRadiosity
+};
 
 struct PredictOptions {
   std::size_t elements = 6000;  ///< of the fine grid, about
@@ -58,6 +70,9 @@ struct PredictOptions {
   /// follows the light into edges and whose cost grows with the square of that number; beyond, and
   /// with links, the smooth field.
   std::size_t gathered_up_to = 0;
+  /// Of the indirect irradiance, where it is asked for at points of surfaces. Direct light is
+  /// exact.
+  Reconstruction reconstruction = Reconstruction::smooth;
   bool error_shares = false;   ///< solve the middle grid twice, to tell what part is the factors'
   bool sensitivities = false;  ///< of the fine grid to each material's reflectance
   SolveGrid solve_grid;        ///< instead of a matrix or links in this process; may be empty
@@ -81,9 +96,10 @@ struct ErrorShares {
 struct GridSolution {
   PatchMesh mesh;
   std::vector<char> usable;
-  BandMatrix direct;     ///< mean irradiance straight from the luminaires
-  BandMatrix indirect;   ///< mean irradiance after one reflection or more
-  BandMatrix reflected;  ///< rho (direct + indirect); radiosity is this plus own exitance
+  Eigen::VectorXd free_area_m2;  ///< of each element: less where another surface covers a part
+  BandMatrix direct;             ///< mean irradiance straight from the luminaires
+  BandMatrix indirect;           ///< mean irradiance after one reflection or more
+  BandMatrix reflected;          ///< rho (direct + indirect); radiosity is this plus own exitance
   FormFactorSummary form_factors;
   std::optional<LinkSummary> links;  ///< where the exchange is hierarchical
   SolveSummary solve;
@@ -164,14 +180,18 @@ class Prediction {
   struct Level {
     GridSolution solution;
     int split = 0;  // halvings of the coarsest elements
+    Reconstruction reconstruction = Reconstruction::smooth;
     std::unique_ptr<Gather> gather;
 
     /// Built when first asked for: means need none.
     const SmoothField& smooth() const;
+    /// Indirect irradiance at a point of an element, as `reconstruction` has it.
+    void evaluate(std::uint32_t patch, const Vec3& point, Eigen::Ref<Eigen::VectorXd> value) const;
     const GatheredField& gathered(const Scene& scene, bool occlusion) const;
 
    private:
-    mutable std::once_flag smooth_once, gathered_once;
+    mutable std::once_flag smooth_once, vertices_once, gathered_once;
+    mutable std::unique_ptr<VertexRadiosity> vertices;
     mutable std::unique_ptr<SmoothField> smooth_field;
     mutable std::unique_ptr<GatheredField> gathered_field;
   };

@@ -79,7 +79,7 @@ Eigen::VectorXd Prediction::indirect_mean(const Level& level, std::uint32_t piec
     }
     const auto field = [&](const Vec3& x) {
       Eigen::VectorXd value(bands);
-      level.smooth().evaluate(i, x, value);
+      level.evaluate(i, x, value);
       return value;
     };
     sum += overlap_m2 * (mean_over(overlap, bands, field) + row - mean_over(element, bands, field));

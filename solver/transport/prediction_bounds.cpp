@@ -92,9 +92,9 @@ Eigen::VectorXd Prediction::solver_bounds() const {
   for (std::size_t i = 0; i < fine().mesh.size(); ++i) {
     if (!fine().usable[i]) continue;
     const auto row = static_cast<Index>(i);
-    mean += fine().mesh.patches[i].area_m2 *
-            (fine().direct.row(row) + fine().indirect.row(row)).transpose();
-    area_m2 += fine().mesh.patches[i].area_m2;
+    mean +=
+        fine().free_area_m2[row] * (fine().direct.row(row) + fine().indirect.row(row)).transpose();
+    area_m2 += fine().free_area_m2[row];
   }
   if (area_m2 > 0.0) sum += kLinksAtMost * fine().links->relative_error / area_m2 * mean;
   return sum;
@@ -111,6 +111,7 @@ void Prediction::compare_grids() const {
   indirect_bound_ = BandMatrix::Zero(fine().indirect.rows(), bands);
   if (!needs_.interreflection) return;
   const Eigen::VectorXd factor = pointwise_factor(distinct_scene_);
+  const bool is_constant = levels_[0]->reconstruction == Reconstruction::constant;
   tbb::parallel_for(
       tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.size())),
       [&](const auto& range) {
@@ -123,8 +124,14 @@ void Prediction::compare_grids() const {
             element[k] = levels_[k]->smooth().find_patch(patch.piece, patch.centroid);
           if (!fine().usable[i]) continue;
           const auto compare = [&](const Vec3& point) {
-            for (int k = 0; k < 3; ++k) levels_[k]->smooth().evaluate(element[k], point, at[k]);
-            const Eigen::VectorXd guard = guarded_difference(at[0], at[1], at[2], kSmoothOrder);
+            for (int k = 0; k < 3; ++k)
+              if (is_constant)
+                levels_[k]->smooth().evaluate(element[k], point, at[k]);
+              else
+                levels_[k]->evaluate(element[k], point, at[k]);
+            Eigen::VectorXd guard = guarded_difference(at[0], at[1], at[2], kSmoothOrder);
+            // Steps between elements say little of the slope within one: the smooth field does.
+            if (is_constant) guard += (at[0] - fine().indirect.row(i).transpose()).cwiseAbs();
             const Eigen::VectorXd own = factor.cwiseProduct((at[0] - at[1]).cwiseAbs());
             indirect_bound_.row(i) =
                 indirect_bound_.row(i).cwiseMax(guard.cwiseMax(own).transpose());
@@ -193,10 +200,11 @@ ErrorShares Prediction::find_error_shares(const Level& resampled) const {
     const auto row = static_cast<Index>(i);
     if (!coarse().usable[i] || scene_->surfaces[next.surface_of(next.patches[i])].is_opening)
       continue;
-    area += next.patches[i].area_m2;
-    mean += next.patches[i].area_m2 * (coarse().direct.row(row) + coarse().indirect.row(row));
-    sampling += next.patches[i].area_m2 *
-                (coarse().indirect.row(row) - resampled.solution.indirect.row(row)).cwiseAbs();
+    const double free_m2 = coarse().free_area_m2[row];
+    area += free_m2;
+    mean += free_m2 * (coarse().direct.row(row) + coarse().indirect.row(row));
+    sampling +=
+        free_m2 * (coarse().indirect.row(row) - resampled.solution.indirect.row(row)).cwiseAbs();
   }
   const BandMatrix bound = surface_irradiance_bound();
   Eigen::VectorXd grids = Eigen::VectorXd::Zero(bound.cols());
@@ -229,7 +237,7 @@ BandMatrix Prediction::surface_irradiance_bound() const {
   Eigen::VectorXd children_area = Eigen::VectorXd::Zero(children.rows());
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     if (!fine().usable[i]) continue;
-    const double area = mesh.patches[i].area_m2;
+    const double area = fine().free_area_m2[static_cast<Index>(i)];
     const Patch& patch = mesh.patches[i];
     const std::uint32_t parent = levels_[1]->smooth().find_patch(patch.piece, patch.centroid);
     children.row(parent) += area * fine().indirect.row(static_cast<Index>(i));

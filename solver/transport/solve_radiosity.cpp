@@ -7,7 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "transport/reduced_basis.h"
+#include "transport/shared_directions.h"
 #include "transport/solve_state.h"
 
 namespace truebox {
@@ -85,7 +85,7 @@ std::string SolveSummary::brief() const {
                      " passes over the form factors";
   if (bands_reduced > 0)
     text += "; " + std::to_string(bands_reduced) + " of " + std::to_string(error_bound.size()) +
-            " bands on a reduced basis that they share";
+            " bands from products of the others";
   return text;
 }
 
@@ -166,7 +166,7 @@ SolveSummary solve_radiosity(const ExchangeOperator& exchange, const BandMatrix&
   if (!source.allFinite())
     state.summary.outcome = SolveOutcome::diverged;
   else if (options.method != SolveMethod::conjugate_gradient || !options.share_bands ||
-           !solve_on_reduced_basis(state))
+           !solve_on_shared_directions(state))
     run(state);
   if (irradiance) {
     *irradiance = std::move(state.gathered);

@@ -33,8 +33,8 @@ struct SolveOptions {
   double relative_bound =
       1e-7;  ///< stop when the bound is below this share of max |B| in each band
   int iteration_limit = 10000;
-  /// Conjugate gradients: all bands on one reduced basis, where rows of rho repeat (a few
-  /// materials). The bound is the same.
+  /// Conjugate gradients: products of a few bands serve them all, where spectra are smooth. The
+  /// bound is the same.
   bool share_bands = true;
   /// Told the radiosity (elements x bands) and the work so far, in passes over S; may be empty.
   std::function<void(double matrix_passes, const BandMatrix& radiosity)> on_progress;
@@ -48,7 +48,7 @@ struct SolveSummary {
   double matrix_passes = 0.0;            ///< over S for all bands; a shot is 1/n of one
   std::vector<double> residual_history;  ///< max over bands of ||r||_inf / ||B||_inf
   Eigen::VectorXd error_bound;           ///< for each band, of any element, W m^-2 nm^-1
-  int bands_reduced = 0;                 ///< bands found on a basis that all bands share
+  int bands_reduced = 0;                 ///< bands less the most products of one pass
   std::string brief() const;
 };
 

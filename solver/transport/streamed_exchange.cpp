@@ -32,12 +32,17 @@ class StreamedExchange final : public ExchangeOperator {
     usable_.assign(mesh_.size(), 1);
     summary_.method = FormFactorMethod::exact_visibility;
     leave_out_buried(request.visibility);
+    tested_ =
+        whole_patches(mesh_, scene_, usable_, (first_.fixed + first_.open).cwiseQuotient(area_m2_));
     const ClosureTest closure =
-        test_closure(mesh_, scene_, request.visibility, usable_, request.options.seed);
+        test_closure(mesh_, scene_, request.visibility, tested_, request.options.seed);
     summary_.closed = closure.closed;
     summary_.closure_rays = closure.rays;
+    if (summary_.closed) leave_out_outside();
     if (summary_.closed) repair();
     const RowSums sums = row_sums(scale_);
+    for (Index i : covered_) area_m2_[i] = sums.fixed[i] + sums.open[i];
+    summary_.covered_patches = covered_.size();
     const VectorXd whole = (sums.fixed + sums.open).cwiseQuotient(area_m2_);
     summary_.row_sum_max = whole.maxCoeff();
     for (std::size_t i = 0; summary_.closed && i < usable_.size(); ++i)
@@ -129,6 +134,16 @@ class StreamedExchange final : public ExchangeOperator {
     if (summary_.buried_patches > 0) first_ = row_sums(scale_);
   }
 
+  // In a closed scene what sees nothing lies outside of it; its row is empty.
+  void leave_out_outside() {
+    for (std::size_t i = 0; i < usable_.size(); ++i) {
+      const auto k = static_cast<Index>(i);
+      if (!usable_[i] || first_.fixed[k] + first_.open[k] >= kEmptyRow * area_m2_[k]) continue;
+      usable_[i] = 0;
+      ++summary_.buried_patches;
+    }
+  }
+
   // x_i sum_j S_ij x_j = wanted_i in the rows that can be mended, x = 1 in the others.
   void repair() {
     const Index n = area_m2_.size();
@@ -138,8 +153,10 @@ class StreamedExchange final : public ExchangeOperator {
     double weighted = 0.0, area = 0.0;
     for (Index i = 0; i < n; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      const double error = std::abs((first_.fixed[i] + first_.open[i]) / area_m2_[i] - 1.0);
-      is_whole_[k] = usable_[k] && error <= kPartlyBuriedRow;
+      const double row_sum = (first_.fixed[i] + first_.open[i]) / area_m2_[i];
+      const double error = std::abs(row_sum - 1.0);
+      if (usable_[k] && !tested_[k]) covered_.push_back(i);
+      is_whole_[k] = tested_[k] && error <= kUnmendableRow;
       if (!is_whole_[k]) continue;
       mended[i] = first_.open[i] >= kLeastShare * area_m2_[i] ? 1.0 : 0.0;
       summary_.closure_error_max = std::max(summary_.closure_error_max, error);
@@ -183,8 +200,9 @@ class StreamedExchange final : public ExchangeOperator {
   const Scene& scene_;
   ExactFormFactorOptions options_;
   VectorXd area_m2_, scale_;
-  std::vector<char> usable_, is_whole_;
-  RowSums first_;  // before the repair
+  std::vector<char> usable_, tested_, is_whole_;
+  std::vector<Index> covered_;  // partly
+  RowSums first_;               // before the repair
   FormFactorSummary summary_;
   int passes_ = 0;
 };

@@ -488,10 +488,35 @@ TEST_F(Program, SolvesOnPolynomialsWithinBothBounds) {
     }
 }
 
-TEST_F(Program, RefusesPolynomialsWhereSurfacesHideEachOther) {
-  const Outcome hidden = run("solve '" + kScene + "' --basis linear");
-  EXPECT_EQ(hidden.code, 4);
-  EXPECT_THAT(hidden.text, HasSubstr("without occlusion"));
+// Linear elements behind blocks agree with constant ones within both bounds.
+TEST_F(Program, SolvesWithPolynomialsWhereSurfacesHideEachOther) {
+  const std::string constant = scratch_path("hidden_constant.json"),
+                    linear = scratch_path("hidden_linear.json");
+  const std::string blocked = scratch_path("blocked.toml");
+  std::ofstream(blocked)
+      << "length_unit = \"m\"\n[bands]\ncentres_nm = [550]\n"
+         "[materials.lamp]\nreflectance = 0.2\nexitance = 1\n"
+         "[materials.grey]\nreflectance = 0.5\n"
+         "[[surfaces]]\nname = \"low\"\nmaterial = \"grey\"\n"
+         "vertices = [[0,0,0],[1,0,0],[1,1,0],[0,1,0]]\n"
+         "[[surfaces]]\nname = \"high\"\nmaterial = \"lamp\"\n"
+         "vertices = [[0,0,1],[0,1,1],[1,1,1],[1,0,1]]\n"
+         "[[surfaces]]\nname = \"between\"\nmaterial = \"grey\"\n"
+         "vertices = [[0.2,0.2,0.5],[0.7,0.2,0.5],[0.7,0.6,0.5],[0.2,0.6,0.5]]\n";
+  ASSERT_EQ(run("solve '" + blocked + "' --elements 600 -o '" + constant + "'").code, 0);
+  ASSERT_EQ(run("solve '" + blocked + "' --basis linear -o '" + linear + "'").code, 0);
+  const auto low = [](const std::string& path) {
+    const auto json = nlohmann::json::parse(std::ifstream(path));
+    return std::pair(json["surfaces"][0]["radiosity"][0].get<double>(),
+                     json["surfaces"][0]["radiosity_error_bound"][0].get<double>());
+  };
+  const auto [c, c_bound] = low(constant);
+  const auto [p, p_bound] = low(linear);
+  EXPECT_NEAR(c, p, c_bound + p_bound);
+  EXPECT_LT(p_bound, 0.05 * p);
+}
+
+TEST_F(Program, RefusesWhatPolynomialsCannotDo) {
   EXPECT_EQ(run("solve " + room() + " --basis linear --adaptive").code, 4);
   EXPECT_EQ(run("solve " + room() + " --basis septic").code, 64);
 }

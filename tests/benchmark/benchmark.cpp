@@ -54,19 +54,30 @@ nlohmann::json as_json(const ClosedBox& c) {
           {"covered_share", c.covered}};
 }
 
+nlohmann::json as_json_array(const std::vector<BandKernels>& rows) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const BandKernels& k : rows)
+    json.push_back({{"threads", k.threads},
+                    {"triad_bytes_per_s", k.triad_bytes_per_s},
+                    {"band_product_flop_per_s", k.product_flop_per_s},
+                    {"band_product_one_band_bytes_per_s", k.product_one_band_bytes_per_s},
+                    {"all_bands_to_one_band_time", k.bands_time_ratio},
+                    {"solve_one_band_s", k.solve_one_band_s},
+                    {"solve_all_bands_to_one_band_time", k.solve_time_ratio},
+                    {"passes", k.matrix_passes},
+                    {"passes_of_one_band", k.one_band_passes},
+                    {"bands_reduced", k.bands_reduced}});
+  return json;
+}
+
 nlohmann::json as_json(const Kernels& k) {
   return {{"elements", k.elements},
           {"bands", k.bands},
-          {"triad_bytes_per_s", k.triad_bytes_per_s},
           {"occlusion_queries_per_s", k.occlusion_queries_per_s},
           {"form_factor_rays_per_s", k.rays_per_s},
           {"form_factor_pairs_per_s", k.pairs_per_s},
           {"form_factor_pairs_unoccluded_per_s", k.pairs_unoccluded_per_s},
-          {"band_product_flop_per_s", k.product_flop_per_s},
-          {"band_product_one_band_bytes_per_s", k.product_one_band_bytes_per_s},
-          {"all_bands_to_one_band_time", k.bands_time_ratio},
-          {"solve_all_bands_to_one_band_time", k.solve_time_ratio},
-          {"bands_reduced", k.bands_reduced}};
+          {"bands_by_threads", as_json_array(k.of_threads)}};
 }
 
 nlohmann::json as_json(const SolverWork& w) {
@@ -149,18 +160,23 @@ void print(const Kernels& k) {
   const auto line = [](const char* name, double value, const char* unit) {
     fmt::print("  {:<58}{:>10.3g} {}\n", name, value, unit);
   };
-  line("memory bandwidth (triad)", 1e-9 * k.triad_bytes_per_s, "GB/s");
   line("occlusion queries alone", 1e-6 * k.occlusion_queries_per_s, "M/s");
   line("rays in form factors", 1e-6 * k.rays_per_s, "M/s");
   line("  share of the queries alone", 100.0 * k.rays_per_s / k.occlusion_queries_per_s, "%");
   line("pairs of form factors", 1e-6 * k.pairs_per_s, "M/s");
   line("pairs of form factors, nothing in between", 1e-6 * k.pairs_unoccluded_per_s, "M/s");
-  line("matrix times all bands", 1e-9 * k.product_flop_per_s, "GFLOP/s");
-  line("matrix times one band, matrix read", 1e-9 * k.product_one_band_bytes_per_s, "GB/s");
-  line("  share of the triad", 100.0 * k.product_one_band_bytes_per_s / k.triad_bytes_per_s, "%");
-  line("time of all bands : time of one", k.bands_time_ratio, "");
-  line("  the same of a whole solve, bands shared", k.solve_time_ratio, "");
-  line("  bands found on the basis of the others", k.bands_reduced, "");
+  for (const BandKernels& b : k.of_threads) {
+    fmt::print("  {} thread{}\n", b.threads, b.threads == 1 ? "" : "s");
+    line("memory bandwidth (triad)", 1e-9 * b.triad_bytes_per_s, "GB/s");
+    line("matrix times all bands", 1e-9 * b.product_flop_per_s, "GFLOP/s");
+    line("matrix times one band, matrix read", 1e-9 * b.product_one_band_bytes_per_s, "GB/s");
+    line("time of all bands : time of one, a pass", b.bands_time_ratio, "");
+    line("  the same of a whole solve", b.solve_time_ratio, "");
+    line("solve of one band", 1e3 * b.solve_one_band_s, "ms");
+    line("  its passes", b.one_band_passes, "");
+    line("  passes of all bands together", b.matrix_passes, "");
+    line("  bands less the most products of a pass", b.bands_reduced, "");
+  }
 }
 
 // Path tracing's error falls like n^-1/2: what it takes to reach the error of each radiosity
@@ -250,7 +266,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   program.add_option("--json", json_path, "also write every number as JSON");
   program.add_option("--reference", reference, "the folder of reference data");
-  bool only_pictures = false, only_form_factors = false;
+  bool only_pictures = false, only_form_factors = false, only_kernels = false;
+  program.add_flag("--only-kernels", only_kernels, "rays, pairs and bands, no more");
   program.add_flag("--only-form-factors", only_form_factors, "all pairs next to View3D, no more");
   std::vector<int> samples{16, 64, 256, 1024};
   program.add_flag("--only-pictures", only_pictures, "radiosity against path tracing, no more");
@@ -286,6 +303,10 @@ int main(int argc, char** argv) {
     print(kernels);
     json["kernels"] = as_json(kernels);
   };
+  if (only_kernels) {
+    kernels_of_all();
+    return 0;
+  }
   if (only_form_factors) {
     compare_form_factors(reference, json);
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);

@@ -92,19 +92,28 @@ FormFactorRows measure_form_factor_rows(const std::filesystem::path& reference_d
                                         std::size_t elements, int threads, int points,
                                         double tolerance, int rows_compared);
 
+/// All bands beside one, with so many threads. Shortest of many times.
+struct BandKernels {
+  int threads = 0;
+  double triad_bytes_per_s = 0.0;             ///< a = b + s c, three doubles counted
+  double product_flop_per_s = 0.0;            ///< S times all bands
+  double product_one_band_bytes_per_s = 0.0;  ///< S times one band: S is read once
+  double bands_time_ratio = 0.0;              ///< time of all bands : time of one, a pass
+  double solve_one_band_s = 0.0;
+  double solve_time_ratio = 0.0;  ///< the same of a whole solve, bands shared
+  double matrix_passes = 0.0;     ///< of that solve
+  double one_band_passes = 0.0;   ///< of the slowest band by itself
+  int bands_reduced = 0;          ///< of that solve: bands less the most products of a pass
+};
+
 /// What the machine does, and what the program makes of it.
 struct Kernels {
   std::size_t elements = 0, bands = 0;
-  double triad_bytes_per_s = 0.0;        ///< a = b + s c, three doubles counted
   double occlusion_queries_per_s = 0.0;  ///< rays alone, between random elements
   double rays_per_s = 0.0;               ///< rays of form factors, over the whole of their time
   double pairs_per_s = 0.0;              ///< all pairs, occlusion included
   double pairs_unoccluded_per_s = 0.0;   ///< the same scene as if nothing stood in between
-  double product_flop_per_s = 0.0;       ///< S times all bands
-  double product_one_band_bytes_per_s = 0.0;  ///< S times one band: S is read once
-  double bands_time_ratio = 0.0;              ///< time of all bands : time of one
-  double solve_time_ratio = 0.0;              ///< the same of a whole solve, bands shared
-  int bands_reduced = 0;                      ///< of that solve, found on the basis of the others
+  std::vector<BandKernels> of_threads;   ///< one and two
 };
 Kernels measure_kernels(const Scene& scene, std::size_t elements);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
 #include <atomic>
@@ -75,6 +76,42 @@ struct BoxProblem {
   }
 };
 
+BandKernels measure_bands(const BoxProblem& box, int threads) {
+  constexpr int kRepetitions = 25;
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                  static_cast<std::size_t>(threads));
+  const auto n = static_cast<double>(box.mesh.size());
+  const Eigen::MatrixXd& s = box.factors.exchange_area_m2;
+  BandKernels result;
+  result.threads = threads;
+  result.triad_bytes_per_s = triad_bytes_per_s();
+  const BandMatrix one = box.source.rightCols(1), one_rho = box.rho.rightCols(1);
+  double sum = 0.0;
+  const double all_s =
+      best_seconds([&] { sum += band_product(s, box.source)(0, 0); }, kRepetitions);
+  const double one_s = best_seconds([&] { sum += band_product(s, one)(0, 0); }, kRepetitions);
+  BandMatrix radiosity;
+  const double solve_all_s = best_seconds(
+      [&] {
+        const auto summary = solve_radiosity(box.factors, box.rho, box.source, {}, radiosity);
+        result.bands_reduced = summary.bands_reduced;
+        result.matrix_passes = summary.matrix_passes;
+      },
+      kRepetitions);
+  result.solve_one_band_s = best_seconds(
+      [&] {
+        result.one_band_passes =
+            solve_radiosity(box.factors, one_rho, one, {}, radiosity).matrix_passes;
+      },
+      kRepetitions);
+  result.solve_time_ratio = solve_all_s / result.solve_one_band_s;
+  if (!(sum >= 0.0)) return {};  // keeps the products from being optimised away
+  result.product_flop_per_s = 2.0 * n * n * static_cast<double>(box.source.cols()) / all_s;
+  result.product_one_band_bytes_per_s = n * n * sizeof(double) / one_s;
+  result.bands_time_ratio = all_s / one_s;
+  return result;
+}
+
 }  // namespace
 
 Kernels measure_kernels(const Scene& scene, std::size_t elements) {
@@ -84,7 +121,6 @@ Kernels measure_kernels(const Scene& scene, std::size_t elements) {
   Kernels result;
   result.elements = box.mesh.size();
   result.bands = scene.bands.size();
-  result.triad_bytes_per_s = triad_bytes_per_s();
   result.occlusion_queries_per_s = occlusion_queries_per_s(box.mesh, visibility);
   FormFactorOptions options = by_rays();
   const double occluded_s =
@@ -95,26 +131,7 @@ Kernels measure_kernels(const Scene& scene, std::size_t elements) {
   result.pairs_unoccluded_per_s =
       0.5 * n * (n - 1.0) /
       best_seconds([&] { form_factors(box.mesh, scene, visibility, options); }, 2);
-  const Eigen::MatrixXd& s = box.factors.exchange_area_m2;
-  const BandMatrix one = box.source.rightCols(1);
-  double sum = 0.0;
-  const double all_s = best_seconds([&] { sum += band_product(s, box.source)(0, 0); });
-  const double one_s = best_seconds([&] { sum += band_product(s, one)(0, 0); });
-  BandMatrix radiosity;
-  const BandMatrix one_rho = box.rho.rightCols(1);
-  SolveOptions each;
-  each.share_bands = false;
-  const double solve_all_s = best_seconds([&] {
-    const auto summary = solve_radiosity(box.factors, box.rho, box.source, {}, radiosity);
-    result.bands_reduced = summary.bands_reduced;
-  });
-  const double solve_one_s =
-      best_seconds([&] { solve_radiosity(box.factors, one_rho, one, each, radiosity); });
-  result.solve_time_ratio = solve_all_s / solve_one_s;
-  if (!(sum >= 0.0)) return {};  // keeps the products from being optimised away
-  result.product_flop_per_s = 2.0 * n * n * static_cast<double>(result.bands) / all_s;
-  result.product_one_band_bytes_per_s = n * n * sizeof(double) / one_s;
-  result.bands_time_ratio = all_s / one_s;
+  for (const int threads : {1, 2}) result.of_threads.push_back(measure_bands(box, threads));
   return result;
 }
 

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "support/tiny_scenes.h"
+#include "transport/interpolated_product.h"
 
 namespace truebox {
 namespace {
@@ -348,7 +349,7 @@ TEST(SolveRadiosity, RefusesToFactoriseWhatIsTooLarge) {
 }
 
 // Three materials and forty bands: what a measured scene looks like.
-class ReducedBasis : public testing::Test {
+class SharedDirections : public testing::Test {
  protected:
   const FormFactors f_ = factors_of(Room::block);
   const Index n_ = f_.size();
@@ -367,7 +368,7 @@ class ReducedBasis : public testing::Test {
   }
 };
 
-TEST_F(ReducedBasis, HoldsItsBoundInEveryBand) {
+TEST_F(SharedDirections, HoldsItsBoundInEveryBand) {
   const BandMatrix truth = direct_solution(f_, rho_, source_);
   for (const double bound : {1e-3, 1e-6, 1e-9, 1e-11}) {
     SolveOptions options;
@@ -388,19 +389,18 @@ TEST_F(ReducedBasis, HoldsItsBoundInEveryBand) {
   }
 }
 
-TEST_F(ReducedBasis, CostsAFractionOfThePasses) {
+TEST_F(SharedDirections, CostsAFractionOfThePasses) {
   SolveOptions shared, each;
   each.share_bands = false;
   BandMatrix b, c;
   const SolveSummary few = solve_radiosity(f_, rho_, source_, shared, b);
   const SolveSummary all = solve_radiosity(f_, rho_, source_, each, c);
   EXPECT_EQ(all.bands_reduced, 0);
-  EXPECT_EQ(few.bands_reduced, kBands);
-  // A round takes eight columns instead of forty, and finding the source's products another.
-  EXPECT_LT(few.matrix_passes, 8.0 / kBands * (all.matrix_passes + 2.0));
+  EXPECT_GT(few.bands_reduced, kBands / 4);
+  EXPECT_LT(few.matrix_passes, 0.5 * all.matrix_passes);
 }
 
-TEST_F(ReducedBasis, EndsByConjugateGradientsWhereRoundingStopsTheSpace) {
+TEST_F(SharedDirections, ReachesABoundNearRounding) {
   rho_ *= 0.999 / rho_.maxCoeff();
   SolveOptions options;
   options.relative_bound = 1e-12;
@@ -415,15 +415,62 @@ TEST_F(ReducedBasis, EndsByConjugateGradientsWhereRoundingStopsTheSpace) {
         << k;
 }
 
-TEST_F(ReducedBasis, StepsAsideWhereEveryElementHasItsOwnReflectance) {
-  for (Index i = 0; i < n_; ++i) rho_.row(i) *= 1.0 - 1e-3 * static_cast<double>(i) / n_;
+TEST_F(SharedDirections, DoesNotAskForFewMaterials) {
+  for (Index i = 0; i < n_; ++i) rho_.row(i) *= 1.0 - 0.3 * static_cast<double>(i) / n_;
   BandMatrix b;
   const SolveSummary summary = solve_radiosity(f_, rho_, source_, {}, b);
   EXPECT_EQ(summary.outcome, SolveOutcome::converged);
-  EXPECT_EQ(summary.bands_reduced, 0);
+  EXPECT_GT(summary.bands_reduced, kBands / 4);
 }
 
-TEST_F(ReducedBasis, TakesBandsThatHaveNothingInCommon) {
+TEST_F(SharedDirections, MultipliesEveryBandWhereSpectraHaveNothingInCommon) {
+  rho_ = (0.45 + 0.45 * BandMatrix::Random(n_, kBands).array()).matrix();
+  source_ = BandMatrix::Random(n_, kBands).cwiseAbs();
+  BandMatrix b;
+  const SolveSummary summary = solve_radiosity(f_, rho_, source_, {}, b);
+  ASSERT_EQ(summary.outcome, SolveOutcome::converged);
+  EXPECT_LE(summary.bands_reduced, kBands / 8);
+  const BandMatrix truth = direct_solution(f_, rho_, source_);
+  for (Index k = 0; k < kBands; ++k)
+    EXPECT_LE((b.col(k) - truth.col(k)).cwiseAbs().maxCoeff(), summary.error_bound[k] + 1e-14);
+}
+
+TEST_F(SharedDirections, StatesABoundThatHoldsWhereIterationsEndEarly) {
+  SolveOptions options;
+  options.iteration_limit = 3;
+  BandMatrix b;
+  const SolveSummary summary = solve_radiosity(f_, rho_, source_, options, b);
+  EXPECT_EQ(summary.outcome, SolveOutcome::iteration_limit);
+  const BandMatrix truth = direct_solution(f_, rho_, source_);
+  for (Index k = 0; k < kBands; ++k) {
+    const double error = (b.col(k) - truth.col(k)).cwiseAbs().maxCoeff();
+    EXPECT_LE(error, summary.error_bound[k]);
+    EXPECT_GT(error, 1e-3 * summary.error_bound[k]);
+  }
+}
+
+TEST(InterpolatedProduct, MissesNoMoreThanItSays) {
+  const FormFactors f = factors_of(Room::block);
+  const DenseExchange exchange(f);
+  // Forty columns of a space of six, and one that has nothing to do with it.
+  BandMatrix x = BandMatrix::Random(f.size(), 6) * BandMatrix::Random(6, 40);
+  x.col(17) = BandMatrix::Random(f.size(), 1);
+  Eigen::VectorXd allowed = Eigen::VectorXd::Constant(40, 1e-6);
+  allowed[5] = -1.0;
+  const InterpolatedProduct found = InterpolatedProducts(exchange)(x, allowed);
+  EXPECT_EQ(found.products, 7);
+  const BandMatrix error = f.exchange_area_m2 * x - found.product;
+  const Eigen::VectorXd row_sums = f.exchange_area_m2.rowwise().sum();
+  for (Index k = 0; k < 40; ++k) {
+    if (k == 5) continue;
+    EXPECT_LE(found.missed[k], 1e-6);
+    for (Index i = 0; i < f.size(); ++i)
+      EXPECT_LE(std::abs(error(i, k)), row_sums[i] * found.missed[k] + 1e-13);
+  }
+  EXPECT_EQ(found.product.col(5).norm(), 0.0);
+}
+
+TEST_F(SharedDirections, TakesBandsThatHaveNothingInCommon) {
   // A black band, a nearly white one, one without light and emission over twelve decades.
   rho_.col(3).setZero();
   rho_.col(7).setConstant(0.9999);

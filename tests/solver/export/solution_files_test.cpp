@@ -3,11 +3,15 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
+#include <optional>
 #include <set>
 
 #include "export/solution_surface.h"
 #include "mesh/hanging_vertices.h"
 #include "solver/export/glb_reader.h"
+#include "support/run_command.h"
+#include "support/scratch.h"
 #include "support/tiny_scenes.h"
 
 namespace truebox {
@@ -86,6 +90,51 @@ TEST(SolutionSurface, HasNoCracksWhereLargerElementsMeetSmallerOnes) {
     }
   }
   EXPECT_EQ(inside, 0u);
+}
+
+// What a command says of a file that stands in `$1`; nothing where its tool is not installed.
+std::optional<std::string> judged(const std::string& tool_is_there, const std::string& command,
+                                  const std::string& name, const std::string& content) {
+  if (run_command(tool_is_there).code != 0) return std::nullopt;
+  const std::string path = scratch_path(name);
+  std::ofstream(path, std::ios::binary) << content;
+  const CommandOutcome outcome = run_command(command + " '" + path + "'");
+  return std::to_string(outcome.code) + " " + outcome.text;
+}
+
+// Debian's python3-vtk9 reads it as ParaView does.
+TEST(SolutionVtu, IsReadByVtkWithItsCellsAndBands) {
+  const Scene scene = tiny::cube_with_block(1.0, 0.5, 1.0);
+  const Prediction prediction = solved(scene, 200);
+  const auto said = judged("/usr/bin/python3 -c 'from vtkmodules import vtkIOXML'",
+                           "/usr/bin/python3 -c \"import sys\n"
+                           "from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader\n"
+                           "reader = vtkXMLUnstructuredGridReader()\n"
+                           "reader.SetFileName(sys.argv[1])\n"
+                           "reader.Update()\n"
+                           "grid = reader.GetOutput()\n"
+                           "b = grid.GetCellData().GetArray('radiosity_W_m-2_nm-1')\n"
+                           "print(reader.GetErrorCode(), grid.GetNumberOfCells(), "
+                           "b.GetNumberOfTuples(), b.GetNumberOfComponents(), "
+                           "round(b.GetTuple1(0), 3))\"",
+                           "solution.vtu", solution_vtu(prediction));
+  if (!said) GTEST_SKIP() << "python3-vtk9 is not installed";
+  const std::string cells = std::to_string(prediction.fine().mesh.size());
+  EXPECT_EQ(*said, "0 0 " + cells + " " + cells + " 1 2.0\n");
+}
+
+// Khronos' own validator (npm's gltf-validator), where $TRUEBOX_GLTF_VALIDATOR is its folder.
+TEST(SolutionGlb, HasNoFaultForTheValidator) {
+  const Scene scene = tiny::cube_with_block(1.0, 0.5, 1.0);
+  const auto said =
+      judged("test -d \"$TRUEBOX_GLTF_VALIDATOR\" && node --version",
+             "node -e \"require(process.env.TRUEBOX_GLTF_VALIDATOR)"
+             ".validateBytes(new Uint8Array(require('fs').readFileSync(process.argv[1])))"
+             ".then(r => console.log(r.issues.numErrors, r.issues.numWarnings, "
+             "r.issues.messages.slice(0, 3).map(m => m.message)))\"",
+             "solution.glb", solution_glb(solved(scene, 200), observer()));
+  if (!said) GTEST_SKIP() << "no gltf-validator in $TRUEBOX_GLTF_VALIDATOR";
+  EXPECT_EQ(said->substr(0, 5), "0 0 0") << *said;
 }
 
 TEST(SolutionGlb, HoldsTheSurfaceAndKeepsTheSpecification) {
