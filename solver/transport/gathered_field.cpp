@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr int kLayers = 7;               // the thinnest cell is 1/128 of an element wide
+constexpr int kLayers = 5;               // the thinnest cell is 1/32 of an element wide
 constexpr std::uint32_t kReceivers = 4;  // elements whose points share their blockers
 constexpr std::uint32_t kSources = 4;    // elements of a partly hidden group
 // Length : distance above which a source is split: lit evenly, or with a shadow's edge across it.
