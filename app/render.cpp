@@ -284,7 +284,7 @@ void add_render_command(CLI::App& program, Action& chosen) {
   command->add_flag(
       "--gather-edges", arguments->prediction.gather_edges,
       "radiosity: indirect light gathered in cells that get thinner towards edges, "
-      "where a field over elements misses some percent (two to three times the time)");
+      "where a field over elements misses some percent (several times the time)");
   command
       ->add_option("--gather-above", arguments->gather_above_percent,
                    "radiosity: final gather in pixels whose bound exceeds this many % (slow)")

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <map>
 
 #include "mesh/hanging_vertices.h"
 
@@ -18,21 +19,23 @@ struct CornerValue {
 
 constexpr std::uint32_t kCentre = 0xffffffffu;
 
-// Where an element's value is wanted: at its corners and at those of its neighbours that hang in
-// its edges, in order; then at its centre if any hang there, for triangles around it.
+// Where an element's value is wanted: at its corners and at those of its neighbours, on other walls
+// as well, that hang in its edges, in order; then at its centre if any hang there, for triangles
+// around it.
 struct Place {
   std::uint32_t patch, vertex;  // into PatchMesh::vertices, or kCentre
 };
 
 std::vector<Place> places_of(const PatchMesh& mesh, const std::vector<char>& is_shown) {
+  const Seams between = seams(mesh, is_shown);
   std::vector<std::vector<HangingVertex>> hanging(mesh.size());
-  for (const HangingVertex& h : hanging_vertices(mesh)) hanging[h.patch].push_back(h);
+  for (const HangingVertex& h : between.hanging) hanging[h.patch].push_back(h);
   std::vector<Place> places;
   for (std::uint32_t i = 0; i < mesh.size(); ++i) {
     if (!is_shown[i]) continue;
     const auto corners = mesh.corners_of(mesh.patches[i]);
     for (std::uint32_t k = 0; k < corners.size(); ++k) {
-      places.push_back({i, corners[k]});
+      places.push_back({i, between.places[corners[k]]});
       for (const HangingVertex& h : hanging[i])
         if (h.corner == k) places.push_back({i, h.vertex});
     }
@@ -83,12 +86,13 @@ SolutionSurface solution_surface(const Prediction& prediction) {
   const std::vector<Place> places = places_of(mesh, is_shown);
   const std::vector<CornerValue> values = values_at(prediction, places);
   SolutionSurface result;
-  std::vector<std::vector<std::uint32_t>> vertices_at(mesh.vertices.size());
+  // Walls that meet share the place of a vertex, not the vertex.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::uint32_t>> vertices_at;
   std::vector<std::size_t> place_of;  // of each vertex, the place whose value it carries
   const auto vertex_of = [&](std::size_t p) {
     const auto added = static_cast<std::uint32_t>(place_of.size());
     if (places[p].vertex != kCentre) {
-      auto& candidates = vertices_at[places[p].vertex];
+      auto& candidates = vertices_at[{mesh.patches[places[p].patch].piece, places[p].vertex}];
       const auto shared = std::find_if(candidates.begin(), candidates.end(), [&](std::uint32_t v) {
         return continuous(values[place_of[v]], values[p]);
       });

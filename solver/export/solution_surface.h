@@ -7,8 +7,9 @@ namespace truebox {
 
 /// A solution as triangles with values at their corners, for viewers. Openings and elements that
 /// lie under another surface are left out. Corners of one element edge share a vertex where the
-/// radiosity is continuous; where it jumps (contact lines) each side has its own. A corner that
-/// hangs in a larger element's edge is a vertex of that element too: no cracks.
+/// radiosity is continuous; where it jumps (contact lines, edges between walls) each side has its
+/// own. A corner that hangs in the edge of another element, on another wall as well, is a vertex of
+/// that element too, at the same place to the last bit: no cracks.
 struct SolutionSurface {
   std::vector<Vec3> positions_m;         ///< one a vertex
   std::vector<std::uint32_t> triangles;  ///< three vertices each, right-hand normal to the lit side

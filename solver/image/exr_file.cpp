@@ -16,6 +16,7 @@
 #include <stdexcept>
 
 #include "image/codecs.h"
+#include "image/deep_exr.h"
 #include "image/image_file.h"
 #include "radiometry/input_error.h"
 
@@ -42,13 +43,14 @@ Imf::Slice float_slice(const float* samples, const Imath::Box2i& window, int wid
 
 namespace {
 
-void require_flat_parts(const std::filesystem::path& path, const Imf::MultiPartInputFile& file) {
+bool is_deep(const Imf::Header& header) {
+  return header.hasType() && Imf::isDeepData(header.type());
+}
+
+void require_one_picture(const std::filesystem::path& path, const Imf::MultiPartInputFile& file) {
   for (int p = 0; p < file.parts(); ++p) {
     const Imf::Header& header = file.header(p);
     const std::string name = header.hasName() ? "part \"" + header.name() + "\"" : "the image";
-    if (header.hasType() && Imf::isDeepData(header.type()))
-      throw InputError(path.string(), 0, "one sample a pixel (flatten deep images first)",
-                       name + " is deep");
     if (header.dataWindow() != file.header(0).dataWindow())
       throw InputError(path.string(), 0, "parts of one size and place", name + " has another");
     for (auto it = header.channels().begin(); it != header.channels().end(); ++it)
@@ -71,7 +73,7 @@ void read_attributes(const Imf::Header& header, Image& image) {
 
 Image codecs::read_exr(const std::filesystem::path& path) try {
   Imf::MultiPartInputFile file(path.c_str(), 1);
-  require_flat_parts(path, file);
+  require_one_picture(path, file);
   const Imath::Box2i window = file.header(0).dataWindow();
   std::size_t count = 0;
   for (int p = 0; p < file.parts(); ++p)
@@ -84,10 +86,20 @@ Image codecs::read_exr(const std::filesystem::path& path) try {
   image.channels.reserve(count);
   for (int p = 0; p < file.parts(); ++p) {
     const Imf::Header& header = file.header(p);
+    const auto add_channel = [&](const char* name) -> Channel& {
+      return image.add_channel(p == 0 ? name : header.name() + "." + name);
+    };
+    if (is_deep(header)) {
+      auto planes = read_flattened(path, file, p);
+      auto plane = planes.begin();
+      for (auto it = header.channels().begin(); it != header.channels().end(); ++it)
+        add_channel(it.name()).samples = std::move(*plane++);
+      continue;
+    }
     Imf::InputPart part(file, p);
     Imf::FrameBuffer buffer;
     for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
-      Channel& channel = image.add_channel(p == 0 ? it.name() : header.name() + "." + it.name());
+      Channel& channel = add_channel(it.name());
       buffer.insert(it.name(), float_slice(channel.samples.data(), window, image.width));
     }
     part.setFrameBuffer(buffer);

@@ -180,16 +180,32 @@ std::vector<ContactLine> meeting_lines(const PatchMesh& mesh, const Scene& scene
   return lines;
 }
 
-LayeredMesh edge_layers(const PatchMesh& mesh, const Scene& scene, const std::vector<char>& usable,
-                        int layers) {
+LayeredMesh layered_mesh(const PatchMesh& mesh, const std::vector<std::vector<Polygon>>& cells_of) {
   LayeredMesh result;
   result.first_cell.reserve(mesh.size() + 1);
+  std::vector<Polygon> all;
+  for (const Piece& piece : mesh.pieces) {
+    all.clear();
+    for (std::uint32_t i = piece.first_patch; i < piece.first_patch + piece.patch_count; ++i) {
+      result.first_cell.push_back(static_cast<std::uint32_t>(result.parent.size()));
+      result.parent.insert(result.parent.end(), cells_of[i].size(), i);
+      all.insert(all.end(), cells_of[i].begin(), cells_of[i].end());
+    }
+    add_piece(result.mesh, piece.surface, piece.polygon, piece.contacts, all);
+  }
+  result.first_cell.push_back(static_cast<std::uint32_t>(result.parent.size()));
+  return result;
+}
+
+LayeredMesh edge_layers(const PatchMesh& mesh, const Scene& scene, const std::vector<char>& usable,
+                        int layers) {
+  std::vector<std::vector<Polygon>> cells_of(mesh.size());
   for (std::uint32_t p = 0; p < mesh.pieces.size(); ++p) {
     const Piece& piece = mesh.pieces[p];
     const std::vector<Zone> zones = zones_of(mesh, scene, p, usable);
     const std::vector<Horizon> horizons = horizons_of(mesh, scene, piece);
-    std::vector<Polygon> all, cells;
     for (std::uint32_t i = piece.first_patch; i < piece.first_patch + piece.patch_count; ++i) {
+      std::vector<Polygon>& cells = cells_of[i];
       cells.assign(1, {});
       mesh.polygon_of(mesh.patches[i], cells[0]);
       const Polygon element = cells[0];
@@ -204,14 +220,9 @@ LayeredMesh edge_layers(const PatchMesh& mesh, const Scene& scene, const std::ve
       for (const Horizon& horizon : horizons)
         if (usable[i] && horizon.box.exteriorDistance(mesh.patches[i].centroid) < horizon.reach_m)
           cut_at(horizon.plane, kSameLine * std::sqrt(mesh.patches[i].area_m2), cells);
-      result.first_cell.push_back(static_cast<std::uint32_t>(result.parent.size()));
-      result.parent.insert(result.parent.end(), cells.size(), i);
-      all.insert(all.end(), cells.begin(), cells.end());
     }
-    add_piece(result.mesh, piece.surface, piece.polygon, piece.contacts, all);
   }
-  result.first_cell.push_back(static_cast<std::uint32_t>(result.parent.size()));
-  return result;
+  return layered_mesh(mesh, cells_of);
 }
 
 }  // namespace truebox

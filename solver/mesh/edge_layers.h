@@ -13,6 +13,9 @@ struct LayeredMesh {
   std::vector<std::uint32_t> first_cell;  ///< of each element; one more ends the last
 };
 
+/// The elements of a mesh cut into cells: `cells_of[i]`, convex polygons, cover element i.
+LayeredMesh layered_mesh(const PatchMesh& mesh, const std::vector<std::vector<Polygon>>& cells_of);
+
 /// Where other surfaces that face a piece meet it, along its rim or across it: there radiosity
 /// behaves like B0 + c x^lambda. Openings do not count: nothing comes from them.
 std::vector<ContactLine> meeting_lines(const PatchMesh& mesh, const Scene& scene,

@@ -20,6 +20,8 @@ using Eigen::VectorXd;
 
 constexpr double kDark = 1e-300;  // keeps an infinite share of nothing from being not a number
 
+constexpr int kMostShare = 16;  // times `edge_samples` that a pixel takes at most
+
 constexpr std::uint32_t kNothing = ~0u, kBack = ~0u - 1;
 
 // Sums of one pixel over its points.
@@ -181,16 +183,23 @@ RenderedImage render(const Prediction& prediction, const Camera& camera,
   tbb::parallel_for(tbb::blocked_range<int>(0, camera.height_px(), 2), [&](const auto& rows) {
     Gather::Scratch scratch;
     PixelSum pixel(static_cast<Index>(bands.size()));
+    const auto is_uneven = [&](const PixelSum& sum) {
+      return (sum.sampling_bound() - options.even_within * sum.mean()).maxCoeff() > 0.0;
+    };
     for (int y = rows.begin(); y < rows.end(); ++y) {
       for (int x = 0; x < camera.width_px(); ++x) {
         pixel.clear();
         renderer.add_points(x, y, options.samples, pixel, scratch);
         const bool is_even = !pixel.mixed && !renderer.corners_differ(x, y, pixel);
-        if (!is_even ||
-            (pixel.sampling_bound() - options.even_within * pixel.mean()).maxCoeff() > 0) {
-          pixel.clear();
-          renderer.add_points(x, y, options.edge_samples, pixel, scratch);
-          pixel.mixed |= !is_even;
+        if (!is_even || is_uneven(pixel)) {
+          // Where the contrast is large, as before a dark background, even those do not suffice.
+          for (int points = options.edge_samples; points <= kMostShare * options.edge_samples;
+               points *= 4) {
+            pixel.clear();
+            renderer.add_points(x, y, points, pixel, scratch);
+            pixel.mixed |= !is_even;
+            if (!is_uneven(pixel)) break;
+          }
           ++edge_pixels;
         }
         VectorXd radiance = pixel.mean();

@@ -10,8 +10,10 @@
 namespace truebox {
 
 struct RenderOptions {
-  int samples = 16;           ///< points of a pixel in which the radiance is even
-  int edge_samples = 256;     ///< of one that an edge, a shadow's edge or a corner crosses
+  int samples = 16;  ///< points of a pixel in which the radiance is even
+  /// Of one that an edge, a shadow's edge or a corner crosses; up to 16 times as many while its
+  /// sampling bound is above `even_within`.
+  int edge_samples = 256;
   double even_within = 2e-2;  ///< sampling bound / radiance up to which a pixel counts as even
   PixelFilter filter = PixelFilter::box;
   /// Pixels whose bound is above this share of their radiance gather their indirect light once

@@ -168,17 +168,19 @@ struct Gather::PartWalk {
   const VisitPart& visit;
   Scratch& scratch;
 
-  void run(const Polygon& polygon, int halvings) const {
+  void run(const Polygon& polygon, int halvings, std::uint64_t path) const {
     if (!any_beyond(polygon, {normal, normal.dot(point)}, 1.0, gather.tolerance_m_)) return;
     const Vec3 centre = centroid(polygon);
     if (diameter_m(polygon) > near_field * (centre - point).norm() && halvings < kDeepestSplit) {
       const std::vector<Polygon> parts = split(polygon);
-      for (const Polygon& part : parts) run(part, halvings + (parts.size() == 2 ? 1 : 2));
+      const bool fits = path != 0 && path >> 60 == 0 && parts.size() <= 16;
+      for (std::size_t k = 0; k < parts.size(); ++k)
+        run(parts[k], halvings + (parts.size() == 2 ? 1 : 2), fits ? path << 4 | k : 0);
       return;
     }
     const double factor =
         gather.visible_factor(point, normal, polygon, piece, scratch.in_view, scratch);
-    if (factor > 0.0) visit(factor, centre, halvings / 2);
+    if (factor > 0.0) visit(factor, {centre, halvings / 2, path});
   }
 };
 
@@ -207,7 +209,7 @@ void Gather::visit_parts(const Vec3& point, const Vec3& normal, const Polygon& p
                          Scratch& scratch) const {
   if (mesh_.pieces[piece].plane.distance_m(point) <= tolerance_m_) return;
   keep_in_view(point, normal, polygon, piece, between, scratch);
-  PartWalk{*this, point, normal, piece, near_field, visit, scratch}.run(polygon, 0);
+  PartWalk{*this, point, normal, piece, near_field, visit, scratch}.run(polygon, 0, 1);
 }
 
 BandMatrix Gather::from_surfaces(const Vec3& point, const Vec3& normal, const BandMatrix& radiosity,
@@ -226,8 +228,8 @@ BandMatrix Gather::from_surfaces(const Vec3& point, const Vec3& normal, const Ba
     for (std::uint32_t j = piece.first_patch; j < piece.first_patch + piece.patch_count; ++j) {
       mesh_.polygon_of(mesh_.patches[j], polygon);
       if (diameter_m(polygon) > kNearField * (mesh_.patches[j].centroid - point).norm()) {
-        const auto add = [&](double factor, const Vec3& centre, int depth) {
-          source_at(j, centre, depth, value);
+        const auto add = [&](double factor, const Part& part) {
+          source_at(j, part.centre, part.depth, value);
           row += factor * value.transpose();
         };
         visit_parts(point, normal, polygon, p, kNearField, blocker_piece_, add, scratch);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -33,10 +34,15 @@ class Gather {
                         std::uint32_t piece, std::span<const std::uint32_t> between,
                         Scratch& scratch) const;
 
+  /// A part of a polygon cut again and again, the same whoever looks at it.
+  struct Part {
+    Vec3 centre;
+    int depth = 0;           ///< how often the polygon was cut in four to get there
+    std::uint64_t path = 1;  ///< four bits a cut, which of the parts; 0 where those do not suffice
+  };
   /// Cuts a polygon on `piece` until each part is shorter than `near_field` times its distance from
-  /// the point, and hands on each part's visible factor, its centroid and how often the polygon was
-  /// cut in four to get there. Only pieces of `between` may block.
-  using VisitPart = std::function<void(double factor, const Vec3& centre, int depth)>;
+  /// the point, and hands on each part's visible factor. Only pieces of `between` may block.
+  using VisitPart = std::function<void(double factor, const Part& part)>;
   void visit_parts(const Vec3& point, const Vec3& normal, const Polygon& polygon,
                    std::uint32_t piece, double near_field, std::span<const std::uint32_t> between,
                    const VisitPart& visit, Scratch& scratch) const;

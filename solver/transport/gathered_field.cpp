@@ -2,14 +2,12 @@
 #include "transport/gathered_field.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/concurrent_unordered_map.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <limits>
-#include <map>
 
-#include "mesh/patch_topology.h"
-#include "mesh/wachspress.h"
 #include "transport/direct_light.h"
 #include "transport/element_tree.h"
 
@@ -18,10 +16,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr std::uint32_t kNone = ~0u;
 constexpr int kLayers = 5;               // the thinnest cell is 1/32 of an element wide
-constexpr double kInside = 0.1;          // of the way to the centroid: corners on a rim
-constexpr std::uint32_t kReceivers = 4;  // elements whose corners share their blockers
+constexpr std::uint32_t kReceivers = 4;  // elements whose points share their blockers
 constexpr std::uint32_t kSources = 4;    // elements of a partly hidden group
 // Length : distance above which a source is split: lit evenly, or with a shadow's edge across it.
 constexpr double kNearField = 0.7, kNearPenumbra = 0.35;
@@ -46,32 +42,70 @@ void collect_tasks(const ElementTree& tree, std::uint32_t index,
 
 }  // namespace
 
-// What the corners of a group of elements receive, and from which other corners.
+// What points need of a grid, whichever points they are.
+struct GatheredField::Surroundings {
+  explicit Surroundings(const FieldSources& sources, std::vector<std::uint32_t> bright)
+      : receivers(element_tree(sources.mesh)),
+        tree(element_tree(sources.mesh, std::move(bright))),
+        culling(sources.mesh, sources.scene, sources.occlusion),
+        lit(sources.mesh, sources.scene, tree, culling),
+        diameters_m(sources.mesh.size()) {
+    collect_tasks(receivers, 0, tasks);
+    sent.max_load_factor(1.0f);
+    Polygon polygon;
+    for (std::uint32_t j = 0; j < diameters_m.size(); ++j) {
+      sources.mesh.polygon_of(sources.mesh.patches[j], polygon);
+      diameters_m[j] = diameter_m(polygon);
+    }
+  }
+  ElementTree receivers, tree;
+  ShaftCulling culling;
+  LitElements lit;
+  std::vector<double> diameters_m;
+  std::vector<std::uint32_t> tasks;  // nodes of `receivers`
+
+  struct PartOf {
+    std::uint32_t patch;
+    std::uint64_t path;
+    bool operator==(const PartOf&) const = default;
+  };
+  struct PartHash {
+    std::size_t operator()(const PartOf& part) const {
+      return (part.path * 0x9e3779b97f4a7c15u + part.patch) * 0xbf58476d1ce4e5b9u;
+    }
+  };
+  // What the centre of a part of an element reflects: light, and shares of corrections not yet
+  // found.
+  struct Sent {
+    Eigen::RowVectorXd light;
+    std::vector<CellField::Share> corrections;
+  };
+  mutable tbb::concurrent_unordered_map<PartOf, Sent, PartHash> sent;
+  bool is_solved = false;
+};
+
+// What the points of a group of elements receive, and from which corners.
 class GatheredField::Collector {
  public:
-  Collector(const GatheredField& field, const ElementTree& tree, const ShaftCulling& culling,
-            const LitElements& lit, const std::vector<double>& diameter_m, BandMatrix& sum,
-            std::vector<std::vector<Weight>>& weights)
+  Collector(const GatheredField& field, const std::vector<GatherPlace>& places, BandMatrix& sum,
+            std::vector<Weights>& weights)
       : field_(field),
         sources_(field.sources_),
-        tree_(tree),
-        culling_(culling),
-        lit_(lit),
-        diameter_m_(diameter_m),
+        around_(*field.around_),
+        places_(places),
         sum_(sum),
         weights_(weights),
-        share_(field.nodes_.size(), 0.0),
+        share_(field.correction_.nodes().size(), 0.0),
         value_(sum.cols()) {}
 
-  void run(const ElementNode& receivers, const std::vector<std::uint32_t>& nodes) {
-    if (nodes.empty()) return;
-    nodes_ = &nodes;
+  void run(const ElementNode& receivers, const std::vector<std::uint32_t>& places) {
+    if (places.empty()) return;
     end_ = receivers.end_of_shaft();
     jobs_.clear();
     blockers_.clear();
-    stack_ = culling_.blockers();
-    descend(tree_.nodes[0], 0);
-    for (std::uint32_t node : nodes) gather(node);
+    stack_ = around_.culling.blockers();
+    descend(around_.tree.nodes[0], 0);
+    for (std::uint32_t place : places) gather(place);
   }
 
  private:
@@ -82,45 +116,45 @@ class GatheredField::Collector {
 
   void descend(const ElementNode& node, std::size_t from) {
     const ShaftEnd end = node.end_of_shaft();
-    if (end.is_behind(end_.horizon, culling_.tolerance_m()) ||
-        end_.is_behind(end.horizon, culling_.tolerance_m()))
+    const ShaftCulling& culling = around_.culling;
+    if (end.is_behind(end_.horizon, culling.tolerance_m()) ||
+        end_.is_behind(end.horizon, culling.tolerance_m()))
       return;
     const std::size_t to = stack_.size();
-    if (culling_.keep_between(end_, end, stack_, from, to)) {
+    if (culling.keep_between(end_, end, stack_, from, to)) {
       if (node.is_leaf() ||
           (node.one_normal && (stack_.size() == to || node.end - node.begin <= kSources))) {
         jobs_.push_back({&node, blockers_.size(), stack_.size() - to});
         blockers_.insert(blockers_.end(), stack_.begin() + static_cast<std::ptrdiff_t>(to),
                          stack_.end());
       } else {
-        descend(tree_.nodes[node.left], to);
-        descend(tree_.nodes[node.right], to);
+        descend(around_.tree.nodes[node.left], to);
+        descend(around_.tree.nodes[node.right], to);
       }
     }
     stack_.resize(to);
   }
 
   void gather(std::uint32_t index) {
-    const Node& node = field_.nodes_[index];
-    if (node.is_hanging) return;
-    const Vec3& normal = sources_.mesh.plane_of(sources_.mesh.patches[node.patch]).normal;
+    const GatherPlace& place = places_[index];
+    const Vec3& normal = sources_.mesh.plane_of(sources_.mesh.patches[place.patch]).normal;
     auto sum = sum_.row(index);
     for (const Job& job : jobs_) {
       const std::span<const std::uint32_t> between{blockers_.data() + job.first_blocker,
                                                    job.blocker_count};
-      for (std::uint32_t j : tree_.patches_of(*job.sources)) {
+      for (std::uint32_t j : around_.tree.patches_of(*job.sources)) {
         const Patch& patch = sources_.mesh.patches[j];
         sources_.mesh.polygon_of(patch, polygon_);
-        const double near_field = lit_.is_partly_hidden(j) ? kNearPenumbra : kNearField;
-        if (diameter_m_[j] > near_field * (patch.centroid - node.point).norm()) {
-          const auto add = [&](double factor, const Vec3& at, int) {
-            sum += factor * near_source(j, at, factor);
+        const double near_field = around_.lit.is_partly_hidden(j) ? kNearPenumbra : kNearField;
+        if (around_.diameters_m[j] > near_field * (patch.centroid - place.point).norm()) {
+          const auto add = [&](double factor, const Gather::Part& part) {
+            add_part(j, part, factor, sum);
           };
-          sources_.gather.visit_parts(node.point, normal, polygon_, patch.piece, near_field,
+          sources_.gather.visit_parts(place.point, normal, polygon_, patch.piece, near_field,
                                       between, add, scratch_);
           continue;
         }
-        const double factor = sources_.gather.visible_factor(node.point, normal, polygon_,
+        const double factor = sources_.gather.visible_factor(place.point, normal, polygon_,
                                                              patch.piece, between, scratch_);
         if (factor > 0.0) sum += factor * sources_.reflected.row(j);
       }
@@ -132,38 +166,53 @@ class GatheredField::Collector {
     touched_.clear();
   }
 
-  // Reflected radiosity of a point without its correction, whose share is noted.
-  Eigen::RowVectorXd near_source(std::uint32_t patch, const Vec3& at, double factor) {
+  // What a part sends, found once for all who look at it.
+  void add_part(std::uint32_t patch, const Gather::Part& part, double factor,
+                BandMatrix::RowXpr sum) {
+    if (part.path == 0) return add(sent_from(patch, part.centre), factor, sum);
+    const Surroundings::PartOf key{patch, part.path};
+    auto known = around_.sent.find(key);
+    if (known == around_.sent.end())
+      known = around_.sent.emplace(key, sent_from(patch, part.centre)).first;
+    add(known->second, factor, sum);
+  }
+
+  void add(const Surroundings::Sent& sent, double factor, BandMatrix::RowXpr sum) {
+    sum += factor * sent.light;
+    for (const CellField::Share& of : sent.corrections) {
+      if (share_[of.node] == 0.0) touched_.push_back(of.node);
+      share_[of.node] += factor * of.factor + std::numeric_limits<double>::min();
+    }
+  }
+
+  // Reflected radiosity of a point: from the lamps, exact, and from the field; while that is still
+  // sought, its correction is only noted.
+  Surroundings::Sent sent_from(std::uint32_t patch, const Vec3& at) {
     const PatchMesh& mesh = sources_.mesh;
     const Piece& piece = mesh.pieces[mesh.patches[patch].piece];
     sources_.smooth.evaluate(patch, at, value_);
-    for (const LitElements::Lamp& lamp : lit_.lamps_of(patch))
+    for (const LitElements::Lamp& lamp : around_.lit.lamps_of(patch))
       value_ += lamp.exitance * sources_.gather.visible_factor(
                                     at, piece.plane.normal, mesh.pieces[lamp.piece].polygon,
                                     lamp.piece, lamp.between, source_scratch_);
-    const PatchMesh& cells = field_.cells_.mesh;
-    const Patch& cell = cells.patches[field_.find_cell(patch, at)];
-    if (field_.node_of_[cell.first_corner] != kNone) {
-      WachspressWeights lambda;
-      const std::size_t count = wachspress_weights(cells, cell, at, lambda);
-      for (std::size_t k = 0; k < count; ++k) {
-        const std::uint32_t node = field_.node_of_[cell.first_corner + k];
-        if (share_[node] == 0.0) touched_.push_back(node);
-        share_[node] += factor * lambda[k] + std::numeric_limits<double>::min();
-      }
-    }
-    return value_.transpose().cwiseProduct(reflectance_of(sources_.scene, piece));
+    Surroundings::Sent sent;
+    const CellField& correction = field_.correction_;
+    const CellField::Shares shares = correction.shares_at(correction.find_cell(patch, at), at);
+    if (!around_.is_solved)
+      sent.corrections.assign(shares.begin(), shares.end());
+    else
+      for (const CellField::Share& of : shares)
+        value_ += of.factor * correction.values.row(of.node).transpose();
+    sent.light = value_.transpose().cwiseProduct(reflectance_of(sources_.scene, piece));
+    return sent;
   }
 
   const GatheredField& field_;
   const FieldSources& sources_;
-  const ElementTree& tree_;
-  const ShaftCulling& culling_;
-  const LitElements& lit_;
-  const std::vector<double>& diameter_m_;
+  const Surroundings& around_;
+  const std::vector<GatherPlace>& places_;
   BandMatrix& sum_;
-  std::vector<std::vector<Weight>>& weights_;
-  const std::vector<std::uint32_t>* nodes_ = nullptr;
+  std::vector<Weights>& weights_;
   ShaftEnd end_;
   std::vector<Job> jobs_;
   std::vector<std::uint32_t> blockers_, stack_, touched_;
@@ -174,170 +223,99 @@ class GatheredField::Collector {
 };
 
 GatheredField::GatheredField(const FieldSources& sources)
-    : sources_(sources), cells_(edge_layers(sources.mesh, sources.scene, sources.usable, kLayers)) {
-  place_nodes();
-  std::vector<std::vector<Weight>> weights(nodes_.size());
-  gather_nodes(weights);
-  solve(weights);
-}
-
-void GatheredField::place_nodes() {
-  const PatchMesh& mesh = cells_.mesh;
-  std::vector<char> usable(mesh.size());
-  for (std::size_t c = 0; c < usable.size(); ++c) {
-    const Piece& piece = mesh.pieces[mesh.patches[c].piece];
-    usable[c] =
-        sources_.usable[cells_.parent[c]] && !sources_.scene.surfaces[piece.surface].is_opening;
-  }
-  const PatchTopology topology(mesh);
-  node_of_.assign(mesh.corners.size(), kNone);
-  // A corner is one place to all cells that can be reached around it, not across contact lines.
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> known;
-  for (std::uint32_t c = 0; c < mesh.size(); ++c) {
-    if (!usable[c]) continue;
-    const Patch& cell = mesh.patches[c];
-    for (std::uint32_t k = 0; k < cell.corner_count; ++k) {
-      const std::uint32_t vertex = mesh.corners[cell.first_corner + k];
-      const std::uint32_t first = topology.reachable(usable, c, vertex, 1).front();
-      const auto [it, is_new] =
-          known.try_emplace({vertex, first}, static_cast<std::uint32_t>(nodes_.size()));
-      node_of_[cell.first_corner + k] = it->second;
-      if (is_new) nodes_.push_back({mesh.vertices[vertex], cells_.parent[c]});
-      const std::uint32_t before = (k + cell.corner_count - 1) % cell.corner_count;
-      Node& node = nodes_[it->second];
-      const bool is_rim = topology.across(c, k).empty() || topology.across(c, before).empty();
-      if (is_rim && node.point == mesh.vertices[vertex]) {
-        node.point += kInside * (cell.centroid - node.point);
-        node.patch = cells_.parent[c];
-      }
-    }
-  }
-  for (const PatchTopology::Constraint& c : topology.constraints(usable)) {
-    hanging_.push_back({node_of_[c.corner], node_of_[c.from], node_of_[c.to], c.share});
-    nodes_[node_of_[c.corner]].is_hanging = true;
-  }
-}
-
-void GatheredField::gather_nodes(std::vector<std::vector<Weight>>& weights) {
-  const PatchMesh& mesh = sources_.mesh;
-  const Index bands = sources_.reflected.cols();
-  correction_ = BandMatrix::Zero(static_cast<Index>(nodes_.size()), bands);
-  if (nodes_.empty()) return;
-  std::vector<std::vector<std::uint32_t>> nodes_of_patch(mesh.size());
-  for (std::uint32_t n = 0; n < nodes_.size(); ++n) nodes_of_patch[nodes_[n].patch].push_back(n);
+    : sources_(sources),
+      correction_(edge_layers(sources.mesh, sources.scene, sources.usable, kLayers), sources.scene,
+                  sources.usable, sources.reflected.cols()) {
   std::vector<std::uint32_t> bright;
-  std::vector<double> diameters_m(mesh.size());
-  Polygon polygon;
-  for (std::uint32_t j = 0; j < mesh.size(); ++j) {
-    mesh.polygon_of(mesh.patches[j], polygon);
-    diameters_m[j] = diameter_m(polygon);
-    if (reflectance_of(sources_.scene, mesh.pieces[mesh.patches[j].piece]).maxCoeff() > 0.0)
+  for (std::uint32_t j = 0; j < sources.mesh.size(); ++j)
+    if (reflectance_of(sources.scene, sources.mesh.pieces[sources.mesh.patches[j].piece])
+            .maxCoeff() > 0.0)
       bright.push_back(j);
-  }
   if (bright.empty()) return;
-  const ElementTree receivers = element_tree(mesh), sources = element_tree(mesh, bright);
-  const ShaftCulling culling(mesh, sources_.scene, sources_.occlusion);
-  const LitElements lit(mesh, sources_.scene, sources, culling);
-  std::vector<std::uint32_t> tasks;
-  collect_tasks(receivers, 0, tasks);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tasks.size()), [&](const auto& range) {
-    Collector collector(*this, sources, culling, lit, diameters_m, correction_, weights);
-    std::vector<std::uint32_t> nodes;
-    for (std::size_t t = range.begin(); t < range.end(); ++t) {
-      const ElementNode& group = receivers.nodes[tasks[t]];
-      nodes.clear();
-      for (std::uint32_t patch : receivers.patches_of(group))
-        nodes.insert(nodes.end(), nodes_of_patch[patch].begin(), nodes_of_patch[patch].end());
-      collector.run(group, nodes);
-    }
-  });
-  Eigen::VectorXd smooth(bands);
-  for (std::size_t n = 0; n < nodes_.size(); ++n) {
-    sources_.smooth.evaluate(nodes_[n].patch, nodes_[n].point, smooth);
-    correction_.row(static_cast<Index>(n)) -= smooth.transpose();
+  around_ = std::make_unique<Surroundings>(sources_, std::move(bright));
+  solve();
+  around_->sent.clear();
+  around_->is_solved = true;
+}
+
+GatheredField::~GatheredField() = default;
+
+// Of the places whose elements receive light; rows of others stay 0.
+BandMatrix GatheredField::collect(const std::vector<GatherPlace>& places,
+                                  std::vector<Weights>& weights) const {
+  BandMatrix sum = BandMatrix::Zero(static_cast<Index>(places.size()), sources_.reflected.cols());
+  weights.assign(places.size(), {});
+  if (!around_ || places.empty()) return sum;
+  std::vector<std::vector<std::uint32_t>> places_of(sources_.mesh.size());
+  for (std::uint32_t n = 0; n < places.size(); ++n) places_of[places[n].patch].push_back(n);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, around_->tasks.size()),
+                    [&](const auto& range) {
+                      Collector collector(*this, places, sum, weights);
+                      std::vector<std::uint32_t> here;
+                      for (std::size_t t = range.begin(); t < range.end(); ++t) {
+                        const ElementNode& group = around_->receivers.nodes[around_->tasks[t]];
+                        here.clear();
+                        for (std::uint32_t patch : around_->receivers.patches_of(group))
+                          here.insert(here.end(), places_of[patch].begin(), places_of[patch].end());
+                        collector.run(group, here);
+                      }
+                    });
+  return sum;
+}
+
+Eigen::RowVectorXd GatheredField::sent_by(const Weights& weights) const {
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(correction_.values.cols());
+  for (const CellField::Share& w : weights) {
+    const Piece& piece =
+        sources_.mesh.pieces[sources_.mesh.patches[correction_.nodes()[w.node].patch].piece];
+    sum += w.factor *
+           reflectance_of(sources_.scene, piece).cwiseProduct(correction_.values.row(w.node));
   }
+  return sum;
+}
+
+BandMatrix GatheredField::gathered_at(const std::vector<GatherPlace>& places) const {
+  std::vector<Weights> none;
+  return collect(places, none);
 }
 
 // Gauss-Seidel: corners of one wall take what those of the next have just become.
-void GatheredField::solve(const std::vector<std::vector<Weight>>& weights) {
-  const BandMatrix own = correction_;
-  tie_hanging();
+void GatheredField::solve() {
+  const std::vector<CellField::Node>& nodes = correction_.nodes();
+  std::vector<GatherPlace> places;
+  std::vector<Index> row_of;
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    if (nodes[n].is_hanging) continue;
+    places.push_back({nodes[n].point, nodes[n].patch});
+    row_of.push_back(static_cast<Index>(n));
+  }
+  std::vector<Weights> weights;
+  BandMatrix own = collect(places, weights);
+  Eigen::VectorXd smooth(own.cols());
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    sources_.smooth.evaluate(places[k].patch, places[k].point, smooth);
+    own.row(static_cast<Index>(k)) -= smooth.transpose();
+    correction_.values.row(row_of[k]) = own.row(static_cast<Index>(k));
+  }
+  correction_.tie_hanging(correction_.values);
   for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
     double change = 0.0;
-    for (std::size_t n = 0; n < nodes_.size(); ++n) {
-      if (weights[n].empty()) continue;
-      const auto row = static_cast<Index>(n);
-      Eigen::RowVectorXd next = own.row(row);
-      for (const Weight& w : weights[n]) {
-        const Piece& piece =
-            sources_.mesh.pieces[sources_.mesh.patches[nodes_[w.node].patch].piece];
-        next += w.factor * reflectance_of(sources_.scene, piece)
-                               .cwiseProduct(correction_.row(static_cast<Index>(w.node)));
-      }
-      change = std::max(change, (next - correction_.row(row)).cwiseAbs().maxCoeff());
-      correction_.row(row) = next;
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      if (weights[k].empty()) continue;
+      const Eigen::RowVectorXd next = own.row(static_cast<Index>(k)) + sent_by(weights[k]);
+      auto now = correction_.values.row(row_of[k]);
+      change = std::max(change, (next - now).cwiseAbs().maxCoeff());
+      now = next;
     }
-    tie_hanging();
-    if (change <= kConverged * correction_.cwiseAbs().maxCoeff()) return;
+    correction_.tie_hanging(correction_.values);
+    if (change <= kConverged * correction_.values.cwiseAbs().maxCoeff()) return;
   }
 }
 
-// A corner that hangs in the edge of a larger cell takes that cell's value: no cracks.
-void GatheredField::tie_hanging() {
-  for (const Hanging& h : hanging_)
-    correction_.row(h.node) =
-        (1.0 - h.share) * correction_.row(h.from) + h.share * correction_.row(h.to);
-}
-
-std::uint32_t GatheredField::find_cell(std::uint32_t patch, const Vec3& point) const {
-  const PatchMesh& mesh = cells_.mesh;
-  std::uint32_t nearest = cells_.first_cell[patch];
-  const std::uint32_t end = cells_.first_cell[patch + 1];
-  if (end - nearest == 1) return nearest;
-  const Vec3& normal = mesh.plane_of(mesh.patches[nearest]).normal;
-  double best_m2 = std::numeric_limits<double>::infinity();
-  for (std::uint32_t c = nearest; c < end; ++c) {
-    const auto corners = mesh.corners_of(mesh.patches[c]);
-    double outside_m2 = 0.0;
-    for (std::size_t k = 0; k < corners.size() && outside_m2 < best_m2; ++k) {
-      const Vec3& a = mesh.vertices[corners[k]];
-      const Vec3 along = mesh.vertices[corners[(k + 1) % corners.size()]] - a;
-      const double side = normal.cross(along).dot(point - a);
-      if (side < 0.0) outside_m2 = std::max(outside_m2, side * side / along.squaredNorm());
-    }
-    if (outside_m2 == 0.0) return c;
-    if (outside_m2 < best_m2) best_m2 = outside_m2, nearest = c;
-  }
-  return nearest;
-}
-
-GatheredField GatheredField::extrapolated(const GatheredField& coarse, double share) const {
-  GatheredField moved = *this;
-  const SmoothField& places = coarse.sources_.smooth;
-  Eigen::VectorXd here(correction_.cols()), there(correction_.cols());
-  for (std::size_t n = 0; n < nodes_.size(); ++n) {
-    const Node& node = nodes_[n];
-    const auto row = static_cast<Index>(n);
-    const std::uint32_t piece = sources_.mesh.patches[node.patch].piece;
-    const std::uint32_t cell = coarse.find_cell(places.find_patch(piece, node.point), node.point);
-    coarse.evaluate(cell, node.point, there);
-    sources_.smooth.evaluate(node.patch, node.point, here);
-    moved.correction_.row(row) +=
-        share * (here + correction_.row(row).transpose() - there).transpose();
-  }
-  moved.tie_hanging();
-  return moved;
-}
-
-void GatheredField::evaluate(std::uint32_t cell_index, const Vec3& point,
+void GatheredField::evaluate(std::uint32_t cell, const Vec3& point,
                              Eigen::Ref<Eigen::VectorXd> values) const {
-  sources_.smooth.evaluate(cells_.parent[cell_index], point, values);
-  const Patch& cell = cells_.mesh.patches[cell_index];
-  if (node_of_[cell.first_corner] == kNone) return;
-  WachspressWeights lambda;
-  const std::size_t count = wachspress_weights(cells_.mesh, cell, point, lambda);
-  for (std::size_t k = 0; k < count; ++k)
-    values += lambda[k] * correction_.row(node_of_[cell.first_corner + k]).transpose();
+  sources_.smooth.evaluate(cells().parent[cell], point, values);
+  correction_.add_to(cell, point, values);
   values = values.cwiseMax(0.0);
 }
 

@@ -3,10 +3,10 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
-#include "mesh/edge_layers.h"
-#include "mesh/smooth_field.h"
+#include "mesh/cell_field.h"
 #include "transport/gather.h"
 
 namespace truebox {
@@ -20,6 +20,12 @@ struct FieldSources {
   const SmoothField& smooth;    ///< of the indirect irradiance
   const Gather& gather;
   bool occlusion;
+};
+
+/// A point of an element.
+struct GatherPlace {
+  Vec3 point;
+  std::uint32_t patch = 0;
 };
 
 /// Indirect irradiance on surfaces: the smooth field plus a correction that is gathered at the
@@ -37,44 +43,33 @@ struct FieldSources {
 class GatheredField {
  public:
   explicit GatheredField(const FieldSources& sources);
+  ~GatheredField();
 
-  const LayeredMesh& cells() const { return cells_; }
-  /// The cell of element `patch` that holds a point (the nearest one if none does).
-  std::uint32_t find_cell(std::uint32_t patch, const Vec3& point) const;
-
-  /// This field plus `share` of its difference from a coarser grid's, taken at its corners.
-  GatheredField extrapolated(const GatheredField& coarse, double share) const;
+  const FieldSources& sources() const { return sources_; }
+  const LayeredMesh& cells() const { return correction_.cells(); }
+  const CellField& correction() const { return correction_; }
+  std::uint32_t find_cell(std::uint32_t patch, const Vec3& point) const {
+    return correction_.find_cell(patch, point);
+  }
 
   /// Values in each band at a point of a cell; never negative.
   void evaluate(std::uint32_t cell, const Vec3& point, Eigen::Ref<Eigen::VectorXd> values) const;
 
+  /// Gathered once more, at any places: what the field interpolates. Places x bands; in parallel.
+  BandMatrix gathered_at(const std::vector<GatherPlace>& places) const;
+
  private:
-  struct Node {
-    Vec3 point;  // of the corner, a little inside where it lies on a rim
-    std::uint32_t patch;
-    bool is_hanging = false;
-  };
-  struct Weight {  // of a node's correction in that of another
-    std::uint32_t node;
-    double factor;
-  };
-  struct Hanging {
-    std::uint32_t node, from, to;
-    double share;
-  };
+  using Weights = std::vector<CellField::Share>;  // of nodes' corrections
+  struct Surroundings;
   class Collector;
 
-  void place_nodes();
-  void gather_nodes(std::vector<std::vector<Weight>>& weights);
-  void solve(const std::vector<std::vector<Weight>>& weights);
-  void tie_hanging();
+  BandMatrix collect(const std::vector<GatherPlace>& places, std::vector<Weights>& weights) const;
+  Eigen::RowVectorXd sent_by(const Weights& weights) const;
+  void solve();
 
   FieldSources sources_;
-  LayeredMesh cells_;
-  std::vector<std::uint32_t> node_of_;  // for each entry of cells_.mesh.corners
-  std::vector<Node> nodes_;
-  std::vector<Hanging> hanging_;
-  BandMatrix correction_;  // nodes x bands
+  CellField correction_;
+  std::unique_ptr<Surroundings> around_;  // none where nothing reflects
 };
 
 }  // namespace truebox

@@ -213,10 +213,6 @@ const GatheredField& Prediction::Level::gathered(const Scene& scene, bool occlus
   return *gathered_field;
 }
 
-const GatheredField& Prediction::gathered(std::size_t level) const {
-  return levels_[level]->gathered(distinct_scene_, needs_.occlusion);
-}
-
 SolveOutcome Prediction::outcome() const {
   for (const auto& level : levels_)
     if (level->solution.solve.outcome != SolveOutcome::converged)
@@ -355,9 +351,10 @@ BoundedIrradiance Prediction::irradiance_on(std::uint32_t piece, const Vec3& poi
   if (needs_.interreflection) {
     const std::uint32_t patch = levels_[0]->smooth().find_patch(piece, point);
     if (gathers_field_) {
-      const std::uint32_t cell = gathered(0).find_cell(patch, point);
-      bound = gathered_bound().row(cell).transpose();
-      best_field_->evaluate(cell, point, value);
+      const RefinedField& field = gathered_field();
+      const std::uint32_t cell = field.find_cell(patch, point);
+      field.evaluate(cell, point, value);
+      bound = gathered_bound_.row(cell).transpose();
     } else {
       levels_[0]->evaluate(patch, point, value);
       bound = indirect_bound().row(patch).transpose();

@@ -14,7 +14,7 @@
 #include "transport/form_factors.h"
 #include "transport/found_exchange.h"
 #include "transport/gather.h"
-#include "transport/gathered_field.h"
+#include "transport/refined_field.h"
 #include "transport/solve_radiosity.h"
 #include "transport/visibility.h"
 
@@ -205,10 +205,9 @@ class Prediction {
   /// Bound of the indirect irradiance within each element, found when first asked for.
   const BandMatrix& indirect_bound() const;
   void compare_grids() const;
-  /// The same within each cell of the gathered field.
-  const BandMatrix& gathered_bound() const;
-  void compare_gathered() const;
-  const GatheredField& gathered(std::size_t level) const;
+  /// The gathered field of three grids, and its bound in each cell, found when first asked for.
+  const RefinedField& gathered_field() const;
+  void refine_gathered() const;
   Eigen::VectorXd extrapolated(const Eigen::VectorXd& fine, const Eigen::VectorXd& coarse) const;
   Eigen::VectorXd indirect_mean(const Level& level, std::uint32_t piece, const Polygon& part) const;
   Eigen::VectorXd direct_mean(std::uint32_t patch, const Polygon& part, bool is_whole) const;
@@ -224,10 +223,10 @@ class Prediction {
   std::unique_ptr<Visibility> visibility_;
   std::optional<ErrorShares> error_shares_;
   bool gathers_field_ = false;
-  mutable std::once_flag compared_, compared_gathered_;
+  mutable std::once_flag compared_, refined_;
   mutable BandMatrix indirect_bound_;  // elements of the finest grid x distinct bands
-  mutable std::unique_ptr<GatheredField> best_field_;  // the finest grid's, extrapolated
-  mutable BandMatrix gathered_bound_;                  // cells of the finest grid x distinct bands
+  mutable std::unique_ptr<RefinedField> gathered_field_;
+  mutable BandMatrix gathered_bound_;  // cells of that field x distinct bands
 };
 
 }  // namespace truebox

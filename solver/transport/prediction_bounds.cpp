@@ -145,51 +145,25 @@ void Prediction::compare_grids() const {
   indirect_bound_.rowwise() += solver_bounds().transpose();
 }
 
-const BandMatrix& Prediction::gathered_bound() const {
-  std::call_once(compared_gathered_, [this] { compare_gathered(); });
-  return gathered_bound_;
+const RefinedField& Prediction::gathered_field() const {
+  std::call_once(refined_, [this] { refine_gathered(); });
+  return *gathered_field_;
 }
 
-void Prediction::compare_gathered() const {
-  const PatchMesh& mesh = gathered(0).cells().mesh;
-  const auto bands = fine().indirect.cols();
-  const Eigen::VectorXd factor = pointwise_factor(distinct_scene_);
-  gathered_bound_ = BandMatrix::Zero(static_cast<Index>(mesh.size()), bands);
-  std::vector<char> usable(mesh.size());
-  for (std::size_t c = 0; c < mesh.size(); ++c)
-    usable[c] = fine().usable[gathered(0).cells().parent[c]];
-  for (const std::size_t k : {1, 2}) gathered(k);  // in parallel inside, so not from within a loop
-  tbb::parallel_for(
-      tbb::blocked_range<std::uint32_t>(0, static_cast<std::uint32_t>(mesh.size())),
-      [&](const auto& range) {
-        Eigen::VectorXd at[3] = {Eigen::VectorXd(bands), Eigen::VectorXd(bands),
-                                 Eigen::VectorXd(bands)};
-        for (std::uint32_t c = range.begin(); c < range.end(); ++c) {
-          if (!usable[c]) continue;
-          const Patch& cell = mesh.patches[c];
-          std::uint32_t element[3] = {gathered(0).cells().parent[c], 0, 0};
-          for (int k = 1; k < 3; ++k)
-            element[k] = levels_[k]->smooth().find_patch(cell.piece, cell.centroid);
-          const auto compare = [&](const Vec3& point) {
-            gathered(0).evaluate(c, point, at[0]);
-            for (std::size_t k = 1; k < 3; ++k)
-              gathered(k).evaluate(gathered(k).find_cell(element[k], point), point, at[k]);
-            const Eigen::VectorXd guard = guarded_difference(at[0], at[1], at[2], kGatheredOrder);
-            const Eigen::VectorXd own = factor.cwiseProduct((at[0] - at[1]).cwiseAbs());
-            gathered_bound_.row(c) =
-                gathered_bound_.row(c).cwiseMax(guard.cwiseMax(own).transpose());
-          };
-          compare(cell.centroid);
-          for (std::uint32_t v : mesh.corners_of(cell))
-            compare(cell.centroid + 0.95 * (mesh.vertices[v] - cell.centroid));
-        }
-      });
-  share_bounds_at_contacts(mesh, usable, gathered_bound_);
-  // What extrapolation moves the field by is added: with coarse cells it may be the wrong way.
-  const double share = bound_is_reliable() ? 1.0 / kRichardson : 0.0;
-  gathered_bound_ *= 1.0 + share;
+void Prediction::refine_gathered() const {
+  std::array<const GatheredField*, 3> grids;
+  for (std::size_t k = 0; k < 3; ++k)
+    grids[k] = &levels_[k]->gathered(distinct_scene_, needs_.occlusion);
+  RefinedFieldOptions options;
+  options.share = bound_is_reliable() ? 1.0 / kRichardson : 0.0;
+  options.bound_factor = pointwise_factor(distinct_scene_);
+  gathered_field_ = std::make_unique<RefinedField>(grids, options);
+  const LayeredMesh& cells = gathered_field_->cells();
+  std::vector<char> usable(cells.mesh.size());
+  for (std::size_t c = 0; c < usable.size(); ++c) usable[c] = fine().usable[cells.parent[c]];
+  gathered_bound_ = gathered_field_->bound();
+  share_bounds_at_contacts(cells.mesh, usable, gathered_bound_);
   gathered_bound_.rowwise() += solver_bounds().transpose();
-  best_field_ = std::make_unique<GatheredField>(gathered(0).extrapolated(gathered(1), share));
 }
 
 ErrorShares Prediction::find_error_shares(const Level& resampled) const {

@@ -135,6 +135,46 @@ TEST(GatheredField, ReproducesAFurnaceUpToItsEdgesAndCorners) {
     }
 }
 
+// A lamp under the ceiling, and a block whose sides look at the edges of its shadow.
+Scene room_with_block() {
+  Scene scene = tiny::cube_with_block(1.0, 0.7);
+  scene.materials.push_back({"lamp", Reflectance(1, 0.7), RadiantExitance(1, 10.0)});
+  tiny::add_surface(
+      scene, "lamp",
+      {{0.35, 0.35, 0.99}, {0.35, 0.65, 0.99}, {0.65, 0.65, 0.99}, {0.65, 0.35, 0.99}}, 1);
+  return scene;
+}
+
+// Each place counts once: its bound is no standard error, and must hold but where the grids have
+// not seen what matters. One in twenty is what a bound at two standard errors would miss.
+TEST(RefinedField, IsWithinItsBoundOfLightGatheredOnAFinerGrid) {
+  const Scene scene = room_with_block();
+  PredictOptions coarse, fine;
+  coarse.elements = 250;
+  coarse.gathered_up_to = 20000;
+  fine.elements = 1000;
+  const Prediction field(scene, coarse), truth(scene, fine);
+  const PatchMesh& mesh = field.fine().mesh;
+  std::mt19937_64 random(3);
+  std::uniform_int_distribution<std::uint32_t> any(0, static_cast<std::uint32_t>(mesh.size()) - 1);
+  Gather::Scratch scratch;
+  int places = 0, outside = 0;
+  while (places < 60) {
+    const std::uint32_t patch = any(random);
+    if (!field.fine().usable[patch]) continue;
+    ++places;
+    const Piece& piece = mesh.pieces[mesh.patches[patch].piece];
+    const auto corners = mesh.corners_of(mesh.patches[patch]);
+    const double towards = std::uniform_real_distribution<double>(0.0, 0.95)(random);
+    const Vec3 x = mesh.patches[patch].centroid +
+                   towards * (mesh.vertices[corners[0]] - mesh.patches[patch].centroid);
+    const BoundedIrradiance a = field.irradiance_on(mesh.patches[patch].piece, x, scratch);
+    const BoundedIrradiance b = truth.irradiance_at(x, piece.plane.normal);
+    outside += std::abs(a.value[0] - b.value[0]) > a.error_bound[0] + b.error_bound[0];
+  }
+  EXPECT_LE(outside, places / 20);
+}
+
 // A duct of unit section, 16 long, its floor a lamp that reflects: half way along it is as good as
 // endless.
 class Duct : public testing::Test {

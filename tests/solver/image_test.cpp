@@ -16,6 +16,7 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <map>
 
 #include "image/channel_map.h"
 #include "image/image_file.h"
@@ -130,24 +131,56 @@ TEST(ExrFile, RefusesPartsThatAreNoOneImage) {
   write_parts(scratch_path("sizes.exr"), 6);
   EXPECT_THAT(message<InputError>([] { read_image(scratch_path("sizes.exr")); }),
               HasSubstr("parts of one size and place, found part \"denoised\""));
+}
+
+// Two pixels in one row, the second without samples; `planes` are the first one's samples.
+void write_deep(const std::string& path, std::map<std::string, std::vector<half>> planes) {
   Imf::Header header(2, 1);
   header.setType(Imf::DEEPSCANLINE);
   header.compression() = Imf::ZIPS_COMPRESSION;
-  header.channels().insert("G", Imf::Channel(Imf::HALF));
-  {
-    Imf::DeepScanLineOutputFile file(scratch_path("deep.exr").c_str(), header);
-    std::vector<unsigned> counts = {0, 0};
-    std::vector<half*> pointers = {nullptr, nullptr};
-    Imf::DeepFrameBuffer buffer;
-    buffer.insertSampleCountSlice(Imf::Slice(Imf::UINT, reinterpret_cast<char*>(counts.data()),
-                                             sizeof(unsigned), 2 * sizeof(unsigned)));
-    buffer.insert("G", Imf::DeepSlice(Imf::HALF, reinterpret_cast<char*>(pointers.data()),
-                                      sizeof(half*), 2 * sizeof(half*), sizeof(half)));
-    file.setFrameBuffer(buffer);
-    file.writePixels(1);
+  Imf::DeepFrameBuffer buffer;
+  std::vector<unsigned> counts = {static_cast<unsigned>(planes.begin()->second.size()), 0};
+  buffer.insertSampleCountSlice(Imf::Slice(Imf::UINT, reinterpret_cast<char*>(counts.data()),
+                                           sizeof(unsigned), 2 * sizeof(unsigned)));
+  std::map<std::string, std::vector<half*>> pointers;
+  for (auto& [name, samples] : planes) {
+    header.channels().insert(name, Imf::Channel(Imf::HALF));
+    std::vector<half*>& at = pointers[name] = {samples.data(), nullptr};
+    buffer.insert(name, Imf::DeepSlice(Imf::HALF, reinterpret_cast<char*>(at.data()), sizeof(half*),
+                                       2 * sizeof(half*), sizeof(half)));
   }
+  Imf::DeepScanLineOutputFile file(path.c_str(), header);
+  file.setFrameBuffer(buffer);
+  file.writePixels(1);
+}
+
+std::vector<half> as_halves(std::initializer_list<float> values) {
+  return {values.begin(), values.end()};
+}
+
+TEST(ExrFile, SeesDeepSamplesAsNearOnesHideThoseBehind) {
+  write_deep(scratch_path("deep.exr"), {{"S0.550,000000nm", as_halves({8, 1, 4})},
+                                        {"A", as_halves({1, 0.25, 0.5})},
+                                        {"Z", as_halves({3, 1, 2})}});
+  const Image image = read_image(scratch_path("deep.exr"));
+  ASSERT_THAT(names_of(image), ElementsAre("A", "S0.550,000000nm", "Z"));
+  // Nearest first: 1, then 4 through 0.75, then 8 through 0.375.
+  EXPECT_THAT(image.channels[1].samples, ElementsAre(7, 0));
+  EXPECT_THAT(image.channels[0].samples, ElementsAre(1, 0));
+  EXPECT_THAT(image.channels[2].samples, ElementsAre(1, 0));
+  // Without opacity the nearest hides all others.
+  write_deep(scratch_path("deep.exr"), {{"G", as_halves({8, 1, 4})}, {"Z", as_halves({3, 1, 2})}});
+  EXPECT_THAT(read_image(scratch_path("deep.exr")).channels[0].samples, ElementsAre(1, 0));
+}
+
+TEST(ExrFile, RefusesDeepSamplesWhoseOrderIsNotKnown) {
+  write_deep(scratch_path("deep.exr"), {{"G", as_halves({1})}});
   EXPECT_THAT(message<InputError>([] { read_image(scratch_path("deep.exr")); }),
-              HasSubstr("flatten deep images first"));
+              HasSubstr("depth, channel Z"));
+  write_deep(scratch_path("deep.exr"),
+             {{"G", as_halves({1, 2})}, {"Z", as_halves({1, 2})}, {"ZBack", as_halves({3, 2})}});
+  EXPECT_THAT(message<InputError>([] { read_image(scratch_path("deep.exr")); }),
+              HasSubstr("do not overlap"));
 }
 
 TEST(SpectralChannel, IsReadInEveryNamingInUse) {

@@ -3,7 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <fstream>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -135,6 +137,28 @@ TEST(SolutionGlb, HasNoFaultForTheValidator) {
              "solution.glb", solution_glb(solved(scene, 200), observer()));
   if (!said) GTEST_SKIP() << "no gltf-validator in $TRUEBOX_GLTF_VALIDATOR";
   EXPECT_EQ(said->substr(0, 5), "0 0 0") << *said;
+}
+
+// In a closed scene every edge of a triangle is one of another triangle, backwards, on another wall
+// as well: where the places differ in one bit only, a viewer shows specks of its background.
+TEST(SolutionSurface, OfAClosedSceneIsWatertightToTheLastBit) {
+  const Scene scene = tiny::cube_with_block(1.0, 0.5, 1.0);
+  const SolutionSurface surface = solution_surface(solved(scene, 300));
+  using Place = std::array<float, 3>;
+  std::map<std::pair<Place, Place>, int> once;
+  const auto place = [&](std::size_t t) {
+    const Vec3& p = surface.positions_m[surface.triangles[t]];
+    return Place{static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
+  };
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+    const Place a = place(t), b = place(t % 3 == 2 ? t - 2 : t + 1);
+    ASSERT_NE(a, b);
+    if (const auto back = once.find({b, a}); back == once.end())
+      ++once[{a, b}];
+    else if (--back->second == 0)
+      once.erase(back);
+  }
+  EXPECT_EQ(once.size(), 0u) << "edges without another side";
 }
 
 TEST(SolutionGlb, HoldsTheSurfaceAndKeepsTheSpecification) {
