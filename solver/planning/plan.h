@@ -18,6 +18,8 @@ struct PlanRequest {
   /// What counts: nothing for all surfaces alike, else what the mesh is refined for.
   std::optional<Goal> goal;
   std::optional<CameraDescription> camera;  ///< whose picture is wanted
+  /// Values are interpolated between corners of elements, as viewers of .vtu and .glb do.
+  bool interpolated = false;
   std::size_t memory_limit_bytes = std::size_t{8} << 30;
   Progress progress;
 
@@ -63,6 +65,7 @@ struct Plan {
   PlannedMesh mesh = PlannedMesh::uniform;
   PlannedExchange exchange = PlannedExchange::full_matrix;
   FormFactorMethod form_factors = FormFactorMethod::ray_casting;
+  bool discontinuities = false;  ///< elements follow lines of light
   std::size_t elements = 0;
   double solver_bound = 1e-7;
   double link_tolerance = 0.0;   ///< hierarchical

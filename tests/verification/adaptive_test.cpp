@@ -7,6 +7,7 @@
 
 #include "adaptive/adaptive_solution.h"
 #include "support/cornell_box.h"
+#include "support/irradiance_truth.h"
 #include "support/tiny_scenes.h"
 #include "verification/accuracy_check.h"
 
@@ -109,6 +110,34 @@ TEST(PredictAdaptively, HoldsItsBoundOnCertifiedMeansAndServesItsGoal) {
     }
     floor_error = std::abs(sum[0] - certified[0]);
   }
+}
+
+// Rms irradiance of the field, over the area, against gathered irradiance. Both have what near
+// sources send; the meshes alone differ.
+TEST(PredictAdaptively, NeedsAThirdOfTheElementsForTheSameRmsIrradiance) {
+  const Scene scene = in_bands_at(cornell_box_in_seven_bands(), {552.0});
+  auto places = places_on_surfaces(scene, 0.12);
+  auto other = places;
+  gather_truth(*solve_truth(scene, 0.6), other);
+  gather_truth(*solve_truth(scene, 0.25), places);
+  const FieldError of_truth = rms_error(places, [&](std::size_t i) -> Eigen::VectorXd {
+    return places[i].indirect - other[i].indirect;
+  });
+  PredictOptions options;
+  options.form_factors.method = FormFactorMethod::exact_visibility;
+  options.near_sources = true;
+  options.elements = 3000;
+  const Prediction uniform(scene, options);
+  options.elements = uniform.fine().mesh.size() / 3;
+  const auto adapted = predict_adaptively(scene, options, goal_of_name("irradiance", scene));
+  ASSERT_LE(adapted->fine().mesh.size(), options.elements);
+  const FieldError of_uniform = field_error(uniform, places);
+  const FieldError of_adapted = field_error(*adapted, places);
+  std::printf("%zu places, two truths %.2g %%; uniform %zu: %.3g %%, adapted %zu: %.3g %%\n",
+              places.size(), 100.0 * of_truth.to_mean, uniform.fine().mesh.size(),
+              100.0 * of_uniform.to_mean, adapted->fine().mesh.size(), 100.0 * of_adapted.to_mean);
+  EXPECT_LT(of_truth.to_mean, 0.5 * of_uniform.to_mean);  // so that the truth may judge
+  EXPECT_LT(of_adapted.to_mean, of_uniform.to_mean);
 }
 
 // A room with a red wall: floor 0, ceiling 1 (lamp), walls 2 to 5 of which 5 is red.
