@@ -62,17 +62,16 @@ void face(SceneOutline& a, const Vec3& point) {
   if (plane_of(a.outline).distance_m(point) < 0.0) std::reverse(a.outline.begin(), a.outline.end());
 }
 
-// "A1 [...] ; A2 [...] ; blocker [...]"
+// "A1 [...] ; A2 [...] ; blocker [...] ; blocker [...]"
 Outlines polygon_scene(const TableFile& table, std::size_t row) {
   auto regions = read_regions(table.rows[row][1]);
-  const bool blocked = table.rows[row][1].find("blocker") != std::string::npos;
-  if (regions.size() != (blocked ? 3 : 2))
-    throw InputError(table.path, table.row_lines[row], "two polygons A1 and A2 (and a blocker)",
+  if (regions.size() < 2)
+    throw InputError(table.path, table.row_lines[row], "two polygons A1 and A2, and blockers",
                      table.rows[row][1]);
   face(regions[0], centroid(regions[1].outline));
   face(regions[1], centroid(regions[0].outline));
-  const char* const names[] = {"A1", "A2", "blocker"};
-  for (std::size_t k = 0; k < regions.size(); ++k) regions[k].name = names[k];
+  for (std::size_t k = 0; k < regions.size(); ++k)
+    regions[k].name = k == 0 ? "A1" : k == 1 ? "A2" : "blocker";
   return regions;
 }
 

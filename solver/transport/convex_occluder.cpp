@@ -14,7 +14,7 @@ namespace truebox {
 namespace {
 
 constexpr std::size_t kMostFaces = 16;    // of a solid; more would not pay
-constexpr std::size_t kMostCorners = 32;  // of both ends of a shaft
+constexpr std::size_t kMostCorners = 16;  // of an end of a shaft
 
 // A polygon without thickness: front, back, and a face across each edge.
 ConvexOccluder sheet(const Blocker& polygon, std::uint32_t index) {
@@ -167,90 +167,39 @@ class Grouping {
   std::map<DirectedEdge, std::uint32_t> owner_;
 };
 
-// Corners of both ends of a shaft and their heights over the faces of a solid.
-struct Shaft {
-  std::size_t ends_a, count;
-  std::array<double, kMostCorners> x, y, z;
-  std::array<std::array<double, kMostCorners>, kMostFaces + 1> heights;
-  std::array<std::uint32_t, kMostFaces + 1> behind;  // bit k: corner k lies behind the face
+// The planes through an edge, as shares of the way from one face's plane to the other's, that have
+// a corner with these heights over the two faces in front.
+void keep_in_front(double height_left, double height_right, double& from, double& to) {
+  if (height_left >= 0.0 && height_right >= 0.0) return;
+  if (height_left < 0.0 && height_right < 0.0) {
+    to = -1.0;
+    return;
+  }
+  const double at = height_left / (height_left - height_right);
+  if (height_left < 0.0)
+    from = std::max(from, at);
+  else
+    to = std::min(to, at);
+}
 
-  Shaft(std::span<const Vec3> a, std::span<const Vec3> b)
-      : ends_a(a.size()), count(a.size() + b.size()) {
-    for (std::size_t k = 0; k < count; ++k) {
-      const Vec3& v = k < ends_a ? a[k] : b[k - ends_a];
-      x[k] = v.x();
-      y[k] = v.y();
-      z[k] = v.z();
+// A segment runs through the solid, and neither of its ends lies in it. Heights over all faces.
+bool passes_through(const double* from, std::size_t stride_from, const double* to,
+                    std::size_t stride_to, std::size_t faces, double tolerance) {
+  double enter = 0.0, leave = 1.0;
+  bool enters = false, leaves = false;
+  for (std::size_t f = 0; f < faces; ++f, from += stride_from, to += stride_to) {
+    if (*from > tolerance) {
+      if (*to > tolerance) return false;
+      enters = true;
+      enter = std::max(enter, (*from - tolerance) / (*from - *to));
+    } else if (*to > tolerance) {
+      leaves = true;
+      leave = std::min(leave, (tolerance - *from) / (*to - *from));
     }
+    if (enter > leave) return false;
   }
-
-  void measure(std::size_t f, const Plane& face, double tolerance) {
-    const double nx = face.normal.x(), ny = face.normal.y(), nz = face.normal.z();
-    std::array<double, kMostCorners>& height = heights[f];
-    for (std::size_t k = 0; k < count; ++k)
-      height[k] = nx * x[k] + ny * y[k] + nz * z[k] - face.offset_m;
-    behind[f] = 0;
-    for (std::size_t k = 0; k < count; ++k)
-      behind[f] |= static_cast<std::uint32_t>(height[k] < -tolerance) << k;
-  }
-
-  // Whether a face, or a plane between those of the two faces at an edge, keeps all apart.
-  bool is_apart_from(const ConvexOccluder& solid, double tolerance) {
-    for (std::size_t f = 0; f < solid.faces.size(); ++f) {
-      measure(f, solid.faces[f], tolerance);
-      if (behind[f] == 0) return true;
-    }
-    for (const ConvexOccluder::Edge& edge : solid.edges)
-      if ((behind[edge.left] & behind[edge.right]) == 0 &&
-          all_beyond_edge(edge.left, edge.right, tolerance))
-        return true;
-    return false;
-  }
-
-  // Some plane through the edge of two faces, between theirs, has all corners in front.
-  bool all_beyond_edge(std::size_t f, std::size_t g, double tolerance) const {
-    double low = 0.0, high = 1.0;
-    for (std::size_t k = 0; k < count; ++k) {
-      const double h_f = heights[f][k] + tolerance, h_g = heights[g][k] + tolerance;
-      if (h_f >= 0.0 && h_g >= 0.0) continue;
-      if (h_f < 0.0 && h_g < 0.0) return false;
-      const double at = h_f / (h_f - h_g);
-      if (h_f < 0.0)
-        low = std::max(low, at);
-      else
-        high = std::min(high, at);
-      if (low > high) return false;
-    }
-    return true;
-  }
-
-  // Every segment from a corner of one end to one of the other runs through the solid, and neither
-  // of its ends lies in it.
-  bool all_pass_through(std::size_t faces, double tolerance) const {
-    for (std::size_t k = 0; k < ends_a; ++k)
-      for (std::size_t l = ends_a; l < count; ++l)
-        if (!passes_through(k, l, faces, tolerance)) return false;
-    return true;
-  }
-
-  bool passes_through(std::size_t k, std::size_t l, std::size_t faces, double tolerance) const {
-    double enter = 0.0, leave = 1.0;
-    bool enters = false, leaves = false;
-    for (std::size_t f = 0; f < faces; ++f) {
-      const double from = heights[f][k], to = heights[f][l];
-      if (from > tolerance) {
-        if (to > tolerance) return false;
-        enters = true;
-        enter = std::max(enter, (from - tolerance) / (from - to));
-      } else if (to > tolerance) {
-        leaves = true;
-        leave = std::min(leave, (tolerance - from) / (to - from));
-      }
-      if (enter > leave) return false;
-    }
-    return enters && leaves;
-  }
-};
+  return enters && leaves;
+}
 
 bool any_in_front(std::span<const Vec3> points, const Plane& plane, double tolerance) {
   return std::any_of(points.begin(), points.end(),
@@ -264,18 +213,58 @@ std::vector<ConvexOccluder> convex_occluders(std::span<const Blocker> polygons,
   return Grouping(polygons, tolerance_m).run();
 }
 
+void MeasuredEnd::measure(std::span<const Vec3> polygon, const Plane& plane,
+                          const ConvexOccluder& solid, double tolerance_m) {
+  const std::size_t faces = solid.faces.size();
+  corners = polygon.size() > kMostCorners || faces > kMostFaces + 1 ? 0 : polygon.size();
+  front = 0;
+  values.clear();
+  sees_solid = any_in_front(solid.corners, plane, tolerance_m);
+  if (!sees_solid || corners == 0) return;
+  values.reserve(faces * corners + 2 * solid.edges.size());
+  for (std::size_t f = 0; f < faces; ++f) {
+    bool behind = false;
+    for (const Vec3& v : polygon) {
+      values.push_back(solid.faces[f].distance_m(v));
+      behind |= values.back() < -tolerance_m;
+    }
+    front |= static_cast<std::uint32_t>(!behind) << f;
+  }
+  for (const ConvexOccluder::Edge& edge : solid.edges) {
+    double from = 0.0, to = 1.0;
+    for (std::size_t k = 0; k < corners; ++k)
+      keep_in_front(values[edge.left * corners + k] + tolerance_m,
+                    values[edge.right * corners + k] + tolerance_m, from, to);
+    values.push_back(from);
+    values.push_back(to);
+  }
+}
+
+ShaftOcclusion shaft_occlusion(const MeasuredEnd& a, const MeasuredEnd& b,
+                               const ConvexOccluder& solid, double tolerance_m) {
+  if (a.corners == 0 || b.corners == 0) return ShaftOcclusion::partial;
+  if (!a.sees_solid || !b.sees_solid || (a.front & b.front) != 0) return ShaftOcclusion::none;
+  const std::size_t faces = solid.faces.size();
+  const double* planes_a = a.values.data() + faces * a.corners;
+  const double* planes_b = b.values.data() + faces * b.corners;
+  for (std::size_t e = 0; e < 2 * solid.edges.size(); e += 2)
+    if (std::max(planes_a[e], planes_b[e]) <= std::min(planes_a[e + 1], planes_b[e + 1]))
+      return ShaftOcclusion::none;
+  for (std::size_t k = 0; k < a.corners; ++k)
+    for (std::size_t l = 0; l < b.corners; ++l)
+      if (!passes_through(&a.values[k], a.corners, &b.values[l], b.corners, faces, tolerance_m))
+        return ShaftOcclusion::partial;
+  return ShaftOcclusion::full;
+}
+
 ShaftOcclusion shaft_occlusion(std::span<const Vec3> a, const Plane& plane_a,
                                std::span<const Vec3> b, const Plane& plane_b,
                                const ConvexOccluder& solid, double tolerance_m) {
-  if (a.size() + b.size() > kMostCorners || solid.faces.size() > kMostFaces + 1)
-    return ShaftOcclusion::partial;
-  if (!any_in_front(solid.corners, plane_a, tolerance_m) ||
-      !any_in_front(solid.corners, plane_b, tolerance_m))
-    return ShaftOcclusion::none;
-  Shaft shaft(a, b);
-  if (shaft.is_apart_from(solid, tolerance_m)) return ShaftOcclusion::none;
-  return shaft.all_pass_through(solid.faces.size(), tolerance_m) ? ShaftOcclusion::full
-                                                                 : ShaftOcclusion::partial;
+  MeasuredEnd end_a, end_b;
+  end_a.measure(a, plane_a, solid, tolerance_m);
+  if (end_a.corners != 0 && !end_a.sees_solid) return ShaftOcclusion::none;
+  end_b.measure(b, plane_b, solid, tolerance_m);
+  return shaft_occlusion(end_a, end_b, solid, tolerance_m);
 }
 
 }  // namespace truebox

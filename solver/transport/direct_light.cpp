@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <map>
 #include <mutex>
+#include <span>
 
 namespace truebox {
 namespace {
@@ -33,32 +35,52 @@ std::vector<LampEnd> ends_of_lamps(const PatchMesh& mesh, const Scene& scene) {
   return lamps;
 }
 
-// From one lamp to the elements below a node; blockers still in question are on a stack.
-template <class Visit>
+// From one lamp down the tree of elements; blockers still in question are on a stack.
 class Walk {
  public:
-  Walk(const ElementTree& tree, const ShaftCulling& culling, const Visit& visit)
-      : tree_(tree), culling_(culling), visit_(visit) {}
+  Walk(const ElementTree& tree, const ShaftCulling& culling) : tree_(tree), culling_(culling) {}
 
-  void run(const ElementNode& node, const LampEnd& lamp) {
-    stack_ = culling_.blockers();
-    descend(node, lamp, 0);
+  // reach(node, blockers) for the first node on every way down from `index` that stops(node,
+  // blockers); none for what cannot see the lamp.
+  template <class Stops, class Reach>
+  void run(std::uint32_t index, const LampEnd& lamp, std::span<const std::uint32_t> blockers,
+           const Stops& stops, const Reach& reach) {
+    stack_.assign(blockers.begin(), blockers.end());
+    descend(index, lamp, 0, stops, reach);
+  }
+
+  // visit(element, lamp, blockers) for each element below `index` that may see the lamp.
+  template <class Visit>
+  void visit_elements(std::uint32_t index, const LampEnd& lamp,
+                      std::span<const std::uint32_t> blockers, const Visit& visit) {
+    run(
+        index, lamp, blockers,
+        [&](std::uint32_t node, auto between) {
+          return between.empty() || tree_.nodes[node].is_leaf();
+        },
+        [&](std::uint32_t node, auto between) {
+          for (std::uint32_t patch : tree_.patches_of(tree_.nodes[node]))
+            visit(patch, lamp, between);
+        });
   }
 
  private:
-  void descend(const ElementNode& node, const LampEnd& lamp, std::size_t from) {
+  template <class Stops, class Reach>
+  void descend(std::uint32_t index, const LampEnd& lamp, std::size_t from, const Stops& stops,
+               const Reach& reach) {
+    const ElementNode& node = tree_.nodes[index];
     const ShaftEnd end = node.end_of_shaft();
     if (end.is_behind(lamp.end.horizon, culling_.tolerance_m()) ||
         lamp.end.is_behind(end.horizon, culling_.tolerance_m()))
       return;
     const std::size_t to = stack_.size();
     if (culling_.keep_between(end, lamp.end, stack_, from, to)) {
-      if (stack_.size() == to || node.is_leaf()) {
-        for (std::uint32_t patch : tree_.patches_of(node))
-          visit_(patch, lamp, std::span(stack_).subspan(to));
+      const auto between = std::span<const std::uint32_t>(stack_).subspan(to);
+      if (stops(index, between)) {
+        reach(index, between);
       } else {
-        descend(tree_.nodes[node.left], lamp, to);
-        descend(tree_.nodes[node.right], lamp, to);
+        descend(node.left, lamp, to, stops, reach);
+        descend(node.right, lamp, to, stops, reach);
       }
     }
     stack_.resize(to);
@@ -66,22 +88,44 @@ class Walk {
 
   const ElementTree& tree_;
   const ShaftCulling& culling_;
-  const Visit& visit_;
   std::vector<std::uint32_t> stack_;
 };
 
-// Each task starts from all blockers again: as few as keep the threads busy.
-constexpr std::size_t kTasks = 64, kLeastElementsOfATask = 64;
+constexpr std::size_t kTasks = 256, kLeastElementsOfATask = 64;
 
-void collect_tasks(const ElementTree& tree, std::uint32_t index, std::size_t elements_of_a_task,
-                   std::vector<std::uint32_t>& tasks) {
-  const ElementNode& node = tree.nodes[index];
-  if (node.is_leaf() || node.end - node.begin <= elements_of_a_task) {
-    tasks.push_back(index);
-    return;
-  }
-  collect_tasks(tree, node.left, elements_of_a_task, tasks);
-  collect_tasks(tree, node.right, elements_of_a_task, tasks);
+// A part of the tree, and the lamps that may reach it, in order, with what may stand between.
+struct Task {
+  struct Lamp {
+    std::size_t index;
+    std::vector<std::uint32_t> between;
+  };
+  std::uint32_t node;
+  std::vector<Lamp> lamps;
+};
+
+// Every lamp walks down from the root once: most blockers of a large scene go in the first steps.
+std::vector<Task> tasks_of(const ElementTree& tree, const ShaftCulling& culling,
+                           const std::vector<LampEnd>& lamps) {
+  const std::size_t most = std::max(kLeastElementsOfATask, tree.order.size() / kTasks);
+  const auto is_task = [&](std::uint32_t node, auto) {
+    return tree.nodes[node].is_leaf() || tree.nodes[node].end - tree.nodes[node].begin <= most;
+  };
+  std::vector<std::map<std::uint32_t, std::vector<std::uint32_t>>> reached(lamps.size());
+  tbb::parallel_for(std::size_t{0}, lamps.size(), [&](std::size_t l) {
+    Walk(tree, culling)
+        .run(0, lamps[l], culling.blockers(), is_task, [&](std::uint32_t node, auto between) {
+          reached[l].try_emplace(node, between.begin(), between.end());
+        });
+  });
+  std::map<std::uint32_t, Task> tasks;
+  for (std::size_t l = 0; l < lamps.size(); ++l)
+    for (auto& [node, between] : reached[l]) {
+      Task& task = tasks.try_emplace(node, Task{node, {}}).first->second;
+      task.lamps.push_back({l, std::move(between)});
+    }
+  std::vector<Task> found;
+  for (auto& [node, task] : tasks) found.push_back(std::move(task));
+  return found;
 }
 
 }  // namespace
@@ -92,18 +136,20 @@ BandMatrix mean_direct(const PatchMesh& mesh, const Scene& scene, const Gather& 
   BandMatrix direct = BandMatrix::Zero(static_cast<Eigen::Index>(mesh.size()),
                                        static_cast<Eigen::Index>(scene.bands.size()));
   const std::vector<LampEnd> lamps = ends_of_lamps(mesh, scene);
-  std::vector<std::uint32_t> tasks;
-  collect_tasks(tree, 0, std::max(kLeastElementsOfATask, tree.order.size() / kTasks), tasks);
+  const std::vector<Task> tasks = tasks_of(tree, culling, lamps);
   std::atomic<std::size_t> done{0};
   std::mutex progress_lock;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tasks.size()), [&](const auto& range) {
     Gather::Scratch scratch;
-    const auto add = [&](std::uint32_t patch, const LampEnd& lamp, auto between) {
-      direct.row(patch) += gather.mean_factor(patch, lamp.piece, between, scratch) * lamp.exitance;
-    };
-    Walk walk(tree, culling, add);
+    Walk walk(tree, culling);
     for (std::size_t t = range.begin(); t < range.end(); ++t)
-      for (const LampEnd& lamp : lamps) walk.run(tree.nodes[tasks[t]], lamp);
+      for (const Task::Lamp& lamp : tasks[t].lamps)
+        walk.visit_elements(tasks[t].node, lamps[lamp.index], lamp.between,
+                            [&](std::uint32_t patch, const LampEnd& end, auto between) {
+                              direct.row(patch) +=
+                                  gather.mean_factor(patch, end.piece, between, scratch) *
+                                  end.exitance;
+                            });
     const std::size_t count = done += range.end() - range.begin();
     if (!progress) return;
     const std::lock_guard guard(progress_lock);
@@ -120,8 +166,9 @@ LitElements::LitElements(const PatchMesh& mesh, const Scene& scene, const Elemen
         {lamp.piece, lamp.exitance.transpose(), {between.begin(), between.end()}});
     partly_hidden_[patch] |= !between.empty();
   };
-  Walk walk(tree, culling, add);
-  for (const LampEnd& lamp : ends_of_lamps(mesh, scene)) walk.run(tree.nodes[0], lamp);
+  Walk walk(tree, culling);
+  for (const LampEnd& lamp : ends_of_lamps(mesh, scene))
+    walk.visit_elements(0, lamp, culling.blockers(), add);
 }
 
 }  // namespace truebox

@@ -51,6 +51,7 @@ class BehindPolygons {
   std::vector<Polygon> cells() const {
     return cells_between_events(receiver_, source_, blockers_, kMostCells);
   }
+  bool may_cross() const { return blockers_.size() > 1; }
   double visible(const Vec3& point) { return factor_sum(point, split(point)); }
   double hidden(const Vec3& point) {
     split(point);
@@ -91,6 +92,7 @@ class BehindSolids {
   std::vector<Polygon> cells() const {
     return cells_between_events(receiver_, source_, solids_, kMostCells);
   }
+  bool may_cross() const { return solids_.size() > 1; }
   double visible(const Vec3& point) {
     switch (look(point)) {
       case ShadowSide::outside: return whole(point);
@@ -218,6 +220,21 @@ class Integrator {
     const double rough = gauss<2>(cell, two);
     cell.value = gauss<3>(cell, three);
     cell.error = std::abs(cell.value - rough);
+    look_at_corners(cell);
+  }
+
+  // Where shadows of two blockers meet, along curves that no cut follows, a lit corner (or a dark
+  // one) may lie between the points of a rule: a cell whose points all see nothing may be off by
+  // what its corners see.
+  void look_at_corners(Cell& cell) {
+    if (cell.value != 0.0 || cell.error != 0.0 || !shadows_.may_cross()) return;
+    constexpr double kInset = 0.01;  // corners themselves belong to the neighbours, too
+    const auto& q = cell.corners;
+    const Vec3 middle = 0.25 * (q[0] + q[1] + q[2] + q[3]);
+    double most = 0.0;
+    for (const Vec3& corner : q)
+      most = std::max(most, factor_at(corner + kInset * (middle - corner), integrate_visible_));
+    cell.error = cell.area_m2 * most;
   }
 
   void apply_fine_rule(Cell& cell) {
@@ -238,6 +255,12 @@ class Integrator {
       in_v += rule.weights[k] * roughness(column);
     }
     cell.rougher_in_u = in_u > in_v;
+    if (in_u == 0.0 && in_v == 0.0) {
+      const auto& q = cell.corners;
+      cell.rougher_in_u = (q[1] + q[2] - q[0] - q[3]).squaredNorm() >
+                          (q[2] + q[3] - q[0] - q[1]).squaredNorm();
+      look_at_corners(cell);
+    }
   }
 
   // Worst cell first: a finer rule, then halves.

@@ -8,12 +8,14 @@
 #include <numbers>
 
 #include "transport/bounded_exchange.h"
+#include "transport/grazing_exchange.h"
 #include "transport/quadrature.h"
 
 namespace truebox {
 namespace {
 
 constexpr double kHorizonTolerance = 1e-13;  // of the polygon's size: rounding of its vertices
+constexpr double kParallel = 1e-15;          // sine between lines that are parallel to rounding
 
 double contour_sum(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon) {
   double sum = 0.0;
@@ -109,21 +111,38 @@ double log_integral(const Vec3& x, const Vec3& b0, const Vec3& u, double length,
   return primitive(length - p) - primitive(-p);
 }
 
+// Two edges, and where their lines come closest: the only point, besides the ends of b, about which
+// the inner integral is singular. Its complex place along a is meeting_m +- i meeting_distance_m.
 struct EdgePair {
   Vec3 a0, a1, b0, b1, u;  // u: unit vector of b
-  double length_b, scale, tolerance;
-  bool parallel;
+  double length_a, length_b, scale, tolerance;
+  double meeting_m = 0.0, meeting_distance_m = std::numeric_limits<double>::infinity();
 };
 
-// Outer integral over the part [s0, s1] of edge a, halved until Gauss converges; near a touching
+// The inner integral holds pi h, h the distance from the other line, where its foot lies between
+// the ends of b: sqrt(c^2 + sin^2 (s - s0)^2) has its branch points at s0 +- i c / sin. Beyond the
+// ends pi h cancels.
+void find_meeting(EdgePair& e) {
+  const Vec3 w = (e.a1 - e.a0) / e.length_a, apart = e.a0 - e.b0, normal = w.cross(e.u);
+  const double sine = normal.norm();
+  if (sine < kParallel) return;
+  const double at = -apart.cross(e.u).dot(normal) / (sine * sine);
+  const double distance = std::abs(apart.dot(normal)) / (sine * sine);
+  const double foot = apart.dot(e.u) + at * w.dot(e.u);
+  if (foot < -distance || foot > e.length_b + distance) return;
+  e.meeting_m = at;
+  e.meeting_distance_m = distance;
+}
+
+// Outer integral over the part [s0, s1] of edge a, halved until Gauss converges; near a singular
 // point the halving is geometric, and what is left below 2^-48 of the edge is negligible.
 double outer_integral(const EdgePair& e, double s0, double s1, int depth) {
   const Vec3 p0 = e.a0 + s0 * (e.a1 - e.a0), p1 = e.a0 + s1 * (e.a1 - e.a0);
   const Vec3 middle = 0.5 * (p0 + p1);
   const double radius = 0.5 * (p1 - p0).norm();
-  // Between parallel lines only the end points are singular; otherwise the whole segment is.
-  const double distance = e.parallel ? std::min((middle - e.b0).norm(), (middle - e.b1).norm())
-                                     : distance_to_segment(middle, e.b0, e.b1);
+  const double distance =
+      std::min({(middle - e.b0).norm(), (middle - e.b1).norm(),
+                std::hypot(0.5 * (s0 + s1) * e.length_a - e.meeting_m, e.meeting_distance_m)});
   int points = gauss_points(radius, distance, e.tolerance);
   if (points > 12 && depth < 48) {
     const double half = 0.5 * (s0 + s1);
@@ -146,16 +165,15 @@ double double_contour(const PlanarPolygon& first, const PlanarPolygon& second, d
   double sum = 0.0;
   for (std::size_t k = 0; k < i.size(); ++k)
     for (std::size_t l = 0; l < j.size(); ++l) {
-      EdgePair e{i[k], i[(k + 1) % i.size()], j[l], j[(l + 1) % j.size()], {}, 0, scale, tolerance,
-                 false};
-      const double length_a = (e.a1 - e.a0).norm();
+      EdgePair e{i[k],     i[(k + 1) % i.size()], j[l], j[(l + 1) % j.size()], {}, 0, 0, scale,
+                 tolerance};
+      e.length_a = (e.a1 - e.a0).norm();
       e.length_b = (e.b1 - e.b0).norm();
-      if (length_a == 0.0 || e.length_b == 0.0) continue;
+      if (e.length_a == 0.0 || e.length_b == 0.0) continue;
       e.u = (e.b1 - e.b0) / e.length_b;
-      const Vec3 w = (e.a1 - e.a0) / length_a;
-      const double cosine = e.u.dot(w);
+      const double cosine = e.u.dot(e.a1 - e.a0) / e.length_a;
       if (std::abs(cosine) < 1e-15) continue;
-      e.parallel = w.cross(e.u).norm() < 1e-12;
+      find_meeting(e);
       const double term = cosine * outer_integral(e, 0.0, 1.0, 0);
       sum += term;
       if (magnitude) *magnitude += std::abs(term) / (2.0 * std::numbers::pi);
@@ -163,13 +181,8 @@ double double_contour(const PlanarPolygon& first, const PlanarPolygon& second, d
   return std::max(0.0, sum / (2.0 * std::numbers::pi));
 }
 
-// Both polygons wholly in front of each other. The smaller one receives.
-double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tolerance,
-                     double* magnitude) {
-  const bool swap =
-      j.radius_m < i.radius_m || (j.radius_m == i.radius_m && j.centroid.sum() < i.centroid.sum());
-  const PlanarPolygon& receiver = swap ? j : i;
-  const PlanarPolygon& source = swap ? i : j;
+double contour_m2(const PlanarPolygon& receiver, const PlanarPolygon& source, double tolerance,
+                  double* magnitude) {
   double nearest = std::numeric_limits<double>::infinity();
   const double apart = (receiver.centroid - source.centroid).norm() - source.radius_m;
   if (apart > 10.0 * receiver.radius_m) {
@@ -186,6 +199,33 @@ double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tole
     *magnitude += receiver.area_m2 *
                   contour_magnitude(receiver.centroid, receiver.plane.normal, source.vertices);
   return lambert_quadrature(receiver, source, points);
+}
+
+// Each term carries some twenty roundings (logarithms, square roots, Gauss sums).
+constexpr double kRounding = 20.0 * std::numeric_limits<double>::epsilon();
+constexpr double kDigitsAskedFor = 1e-6;  // rougher answers do not mind that contours cancel
+constexpr double kCancels = 1e-11;
+constexpr double kGrazing = 0.1;  // relative height below which one plane is nearly shared
+
+// Both polygons wholly in front of each other. The smaller one receives.
+double unoccluded_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tolerance,
+                     double* magnitude) {
+  const bool swap =
+      j.radius_m < i.radius_m || (j.radius_m == i.radius_m && j.centroid.sum() < i.centroid.sum());
+  const PlanarPolygon& receiver = swap ? j : i;
+  const PlanarPolygon& source = swap ? i : j;
+  if (tolerance > kDigitsAskedFor) return contour_m2(receiver, source, tolerance, magnitude);
+  double terms = 0.0;
+  double result = contour_m2(receiver, source, tolerance, &terms);
+  if (kRounding * terms > kCancels * result) {
+    const double height = relative_height(i, j);
+    if (height > 0.0 && height < kGrazing) {
+      result = grazing_exchange_m2(receiver, source, tolerance);
+      terms = result / height;
+    }
+  }
+  if (magnitude) *magnitude += terms;
+  return result;
 }
 
 // Bit 0: some of the polygon lies above the plane, bit 1: some below.
@@ -254,8 +294,6 @@ BoundedExchange bounded_exchange(const PlanarPolygon& i, const PlanarPolygon& j,
   double magnitude = 0.0;
   BoundedExchange result;
   result.exchange_area_m2 = exchange_m2(i, j, relative_tolerance, &magnitude);
-  // Each term carries some twenty roundings (logarithms, square roots, Gauss sums).
-  constexpr double kRounding = 20.0 * std::numeric_limits<double>::epsilon();
   result.error_bound_m2 = relative_tolerance * result.exchange_area_m2 + kRounding * magnitude;
   return result;
 }

@@ -124,7 +124,8 @@ PairKernel::PairKernel(const std::vector<PlanarPolygon>& patches,
       tolerance_(relative_tolerance),
       tolerance_m_(tolerance_m),
       stride_(patches.size() + kLanes),
-      is_simple_(patches.size()) {
+      is_simple_(patches.size()),
+      buffer_of_(patches.size()) {
   for (int points = kLeastOrder; points < kLeastOrder + kOrders; ++points) {
     Rule& rule = rules_.emplace_back();
     rule.least_ratio = least_ratio(points, relative_tolerance);
@@ -145,7 +146,14 @@ PairKernel::PairKernel(const std::vector<PlanarPolygon>& patches,
     normal_y_[at] = patch.plane.normal.y();
     normal_z_[at] = patch.plane.normal.z();
     is_simple_[at] = patch.vertices.size() <= 4;
-    if (!is_simple_[at]) continue;
+    if (!is_simple_[at]) {
+      buffer_of_[at] = static_cast<std::uint32_t>(buffers_.size());
+      auto& buffers = buffers_.emplace_back();
+      auto& buffered = buffered_.emplace_back();
+      for (std::size_t k = 0; k < kOrders; ++k)
+        buffered[k] = buffers[k].fill(patch, kLeastOrder + static_cast<int>(k));
+      continue;
+    }
     for (int k = 0; k < kOrders; ++k) {
       Rule& rule = rules_[static_cast<std::size_t>(k)];
       std::size_t to = at;
@@ -160,19 +168,19 @@ PairKernel::PairKernel(const std::vector<PlanarPolygon>& patches,
   }
 }
 
-PatchPoints PairKernel::points(const Rule& rule, int order, std::size_t position) const {
+PatchPoints PairKernel::points(int order, std::size_t position) const {
+  if (is_simple_[position]) return run_points(order, position);
+  return buffered_[buffer_of_[position]][static_cast<std::size_t>(order - kLeastOrder)];
+}
+
+PatchPoints PairKernel::run_points(int order, std::size_t position) const {
+  const Rule& rule = rules_[static_cast<std::size_t>(order - kLeastOrder)];
   return {&rule.x[position],      &rule.y[position], &rule.z[position],
           &rule.weight[position], stride_,           static_cast<std::uint32_t>(order * order)};
 }
 
 double PairKernel::product_rule(int order, std::uint32_t i, std::uint32_t j) const {
-  PatchPointBuffer first, second;
-  const Rule& rule = rules_[static_cast<std::size_t>(order - kLeastOrder)];
-  const auto points_of = [&](std::uint32_t patch, PatchPointBuffer& buffer) {
-    return is_simple_[position_of_[patch]] ? points(rule, order, position_of_[patch])
-                                           : buffer.fill(patches_[patch], order);
-  };
-  const PatchPoints p = points_of(i, first), q = points_of(j, second);
+  const PatchPoints p = points(order, position_of_[i]), q = points(order, position_of_[j]);
   const Vec3 &n = patches_[i].plane.normal, &m = patches_[j].plane.normal;
   double sum = 0.0;
   for (std::uint32_t a = 0; a < p.count; ++a) {
@@ -239,10 +247,9 @@ void PairKernel::exchange_areas_m2(std::uint32_t i, std::size_t begin, bool face
     }
     for (int order = kLeastOrder; order < kLeastOrder + kOrders; ++order) {
       if (!(wanted >> order & 1u)) continue;
-      const Rule& rule = rules_[static_cast<std::size_t>(order - kLeastOrder)];
-      const BatchEnd patch{points(rule, order, own), &normal_x_[own], &normal_y_[own],
+      const BatchEnd patch{run_points(order, own), &normal_x_[own], &normal_y_[own],
                            &normal_z_[own]};
-      const BatchEnd run{points(rule, order, at), &normal_x_[at], &normal_y_[at], &normal_z_[at]};
+      const BatchEnd run{run_points(order, at), &normal_x_[at], &normal_y_[at], &normal_z_[at]};
       if (first)
         product_rules_to_run(patch, run, found.data());
       else

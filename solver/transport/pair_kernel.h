@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -63,7 +64,9 @@ class PairKernel {
     std::vector<double> x, y, z, weight;
   };
 
-  PatchPoints points(const Rule& rule, int order, std::size_t position) const;
+  PatchPoints points(int order, std::size_t position) const;
+  // From the rules, whatever the patch: a run may hold some that are not simple.
+  PatchPoints run_points(int order, std::size_t position) const;
   double product_rule(int order, std::uint32_t i, std::uint32_t j) const;
   int order_for(std::uint32_t i, std::uint32_t j) const;
   bool is_in_front(const PlanarPolygon& polygon, const Plane& plane) const;
@@ -74,6 +77,10 @@ class PairKernel {
   std::size_t stride_;
   std::vector<Rule> rules_;
   std::vector<char> is_simple_;  // a triangle or quad, by position
+  // Of those that are not, by position and order; their points are not in the rules.
+  std::vector<std::array<PatchPointBuffer, kOrders>> buffers_;
+  std::vector<std::array<PatchPoints, kOrders>> buffered_;
+  std::vector<std::uint32_t> buffer_of_;
   std::vector<double> centre_x_, centre_y_, centre_z_, radius_, normal_x_, normal_y_, normal_z_;
 };
 

@@ -27,7 +27,11 @@ bool stands_between(const Plane& plane, const PatchMesh& mesh, double tolerance_
 // A walk down two trees at once. Occluders that are still in question live on a stack.
 class PairPlanner::Walk {
  public:
-  Walk(const PairPlanner& planner, const Visitor& visitor) : planner_(planner), visitor_(visitor) {}
+  Walk(const PairPlanner& planner, Memory& memory, const Visitor& visitor)
+      : planner_(planner), memory_(memory), visitor_(visitor) {
+    const std::size_t pairs = planner.nodes_.size() * planner.occluders_.size();
+    memory.place.resize(pairs <= kMostPlaces ? pairs : 0);
+  }
 
   void run(const Node& a, const Node& b) {
     stack_.resize(planner_.occluders_.size());
@@ -58,14 +62,39 @@ class PairPlanner::Walk {
       const std::uint32_t id = stack_[k];
       // A face of a convex solid looks away from it.
       if (id == own_a || id == own_b || !hull.intersects(planner_.occluders_[id].box)) continue;
-      switch (shaft_occlusion(a.outline, plane_of(a), b.outline, plane_of(b),
-                              planner_.occluders_[id], planner_.tolerance_m_)) {
+      switch (shaft(a, b, id)) {
         case ShaftOcclusion::full: return false;
         case ShaftOcclusion::partial: stack_.push_back(id); break;
         case ShaftOcclusion::none: break;
       }
     }
     return true;
+  }
+
+  ShaftOcclusion shaft(const Node& a, const Node& b, std::uint32_t id) {
+    const ConvexOccluder& solid = planner_.occluders_[id];
+    if (memory_.place.empty())
+      return shaft_occlusion(a.outline, plane_of(a), b.outline, plane_of(b), solid,
+                             planner_.tolerance_m_);
+    if (memory_.used + 2 > kMostEnds) forget();
+    const std::uint32_t at_a = measured(a, id), at_b = measured(b, id);
+    return shaft_occlusion(memory_.ends[at_a], memory_.ends[at_b], solid, planner_.tolerance_m_);
+  }
+
+  std::uint32_t measured(const Node& node, std::uint32_t id) {
+    const auto index = static_cast<std::size_t>(&node - planner_.nodes_.data());
+    std::uint32_t& place = memory_.place[index * planner_.occluders_.size() + id];
+    if (place != 0) return place;
+    place = static_cast<std::uint32_t>(++memory_.used);
+    if (memory_.ends.size() <= place) memory_.ends.resize(2 * place);
+    memory_.ends[place].measure(node.outline, plane_of(node), planner_.occluders_[id],
+                                planner_.tolerance_m_);
+    return place;
+  }
+
+  void forget() {
+    std::fill(memory_.place.begin(), memory_.place.end(), 0u);
+    memory_.used = 0;
   }
 
   void descend(const Node& a, const Node& b, std::size_t from) {
@@ -93,7 +122,11 @@ class PairPlanner::Walk {
     return {planner_.order_.data() + node.begin, node.end - node.begin};
   }
 
+  static constexpr std::size_t kMostPlaces = std::size_t{1} << 22;  // 16 MiB
+  static constexpr std::size_t kMostEnds = std::size_t{1} << 17;    // some 60 MiB
+
   const PairPlanner& planner_;
+  Memory& memory_;
   const Visitor& visitor_;
   std::vector<std::uint32_t> stack_;
 };
@@ -190,12 +223,12 @@ std::uint32_t PairPlanner::make_node(std::uint32_t piece, std::uint32_t begin, s
   return index;
 }
 
-void PairPlanner::visit(std::size_t task, const Visitor& visitor) const {
-  Walk(*this, visitor).run(nodes_[tasks_[task].a], nodes_[tasks_[task].b]);
+void PairPlanner::visit(std::size_t task, Memory& memory, const Visitor& visitor) const {
+  Walk(*this, memory, visitor).run(nodes_[tasks_[task].a], nodes_[tasks_[task].b]);
 }
 
-void PairPlanner::visit_row(std::uint32_t patch, const Visitor& visitor) const {
-  Walk walk(*this, visitor);
+void PairPlanner::visit_row(std::uint32_t patch, Memory& memory, const Visitor& visitor) const {
+  Walk walk(*this, memory, visitor);
   const std::uint32_t piece = mesh_.patches[patch].piece;
   for (std::uint32_t p = 0; p < root_.size(); ++p)
     if (p != piece) walk.run(nodes_[leaf_[patch]], nodes_[root_[p]]);

@@ -31,6 +31,15 @@ class PairPlanner {
     std::function<void(std::size_t pairs)> hidden;
   };
 
+  /// Nodes that were measured against occluders, kept by one thread from visit to visit.
+  class Memory {
+   private:
+    friend class PairPlanner;
+    std::vector<std::uint32_t> place;  // in `ends`, of each node and occluder; 0: not measured
+    std::vector<MeasuredEnd> ends;
+    std::size_t used = 0;
+  };
+
   /// Without `occlusion` every pair is unoccluded.
   PairPlanner(const PatchMesh& mesh, const Scene& scene, const std::vector<PlanarPolygon>& patches,
               double tolerance_m, bool occlusion);
@@ -47,9 +56,9 @@ class PairPlanner {
 
   /// Independent shares of the work: each pair of patches of different pieces is in one of them.
   std::size_t tasks() const { return tasks_.size(); }
-  void visit(std::size_t task, const Visitor& visitor) const;
+  void visit(std::size_t task, Memory& memory, const Visitor& visitor) const;
   /// All pairs of one patch, as i, with every patch of other pieces.
-  void visit_row(std::uint32_t patch, const Visitor& visitor) const;
+  void visit_row(std::uint32_t patch, Memory& memory, const Visitor& visitor) const;
 
  private:
   struct Node {

@@ -244,9 +244,10 @@ BandMatrix Prediction::surface_irradiance_bound() const {
         (children.row(row) - children_area[row] * coarse().indirect.row(row)).cwiseAbs();
     area[surface] += children_area[row];
   }
+  const Eigen::VectorXd solver = solver_bounds();
   for (Index s = 0; s < surfaces; ++s)
     if (area[s] > 0.0)
-      all.row(s) = expand(sum.row(s).transpose() / area[s] + solver_bounds()).transpose();
+      all.row(s) = expand(sum.row(s).transpose() / area[s] + solver).transpose();
   return all;
 }
 

@@ -47,11 +47,24 @@ ViewFactorEstimate from_analytic(const PlanarPolygon& i, const PlanarPolygon& j,
   return result;
 }
 
+// Behind solids where that is possible: several times as fast, and blocks have no inner edges.
+VisibleExchange exchange_behind(const PlanarPolygon& i, const PlanarPolygon& j,
+                                std::span<const ConvexOccluder* const> solids,
+                                std::span<const Blocker* const> faces,
+                                const ExactVisibilityOptions& options) {
+  const bool j_receives = j.radius_m < i.radius_m;
+  if (const auto seen =
+          visible_exchange(j_receives ? j : i, j_receives ? i : j, solids, options))
+    return *seen;
+  return visible_exchange(i, j, faces, options);
+}
+
 ViewFactorEstimate from_exact_visibility(const PlanarPolygon& i, const PlanarPolygon& j,
-                                         std::span<const Blocker* const> blockers,
+                                         std::span<const ConvexOccluder* const> solids,
+                                         std::span<const Blocker* const> faces,
                                          const ViewFactorOptions& options) {
-  const auto seen =
-      visible_exchange(i, j, blockers, {options.relative_tolerance, options.most_evaluations});
+  const auto seen = exchange_behind(i, j, solids, faces,
+                                    {options.relative_tolerance, options.most_evaluations});
   ViewFactorEstimate result;
   result.method = ViewFactorMethod::exact_visibility;
   result.exchange_area_m2 = seen.exchange_area_m2;
@@ -146,22 +159,49 @@ ViewFactors::ViewFactors(const Scene& scene) {
       pieces_.push_back(std::move(piece));
     }
   }
+  find_solids();
+}
+
+constexpr std::uint32_t kNone = 0xffffffffu;
+
+void ViewFactors::find_solids() {
+  std::vector<Blocker> blockers;
+  std::vector<std::uint32_t> piece_of;
+  for (std::uint32_t p = 0; p < pieces_.size(); ++p) {
+    if (pieces_[p].is_opening) continue;
+    blockers.push_back(pieces_[p].blocker);
+    piece_of.push_back(p);
+  }
+  solids_ = convex_occluders(blockers, tolerance_m_);
+  solid_of_piece_.assign(pieces_.size(), kNone);
+  for (std::uint32_t s = 0; s < solids_.size(); ++s)
+    for (std::uint32_t& member : solids_[s].members) {
+      member = piece_of[member];
+      solid_of_piece_[member] = s;
+    }
 }
 
 // False if one blocker hides everything.
-bool ViewFactors::find_blockers(std::uint32_t p, std::uint32_t q,
-                                std::vector<const Blocker*>& blockers) const {
+bool ViewFactors::find_between(std::uint32_t p, std::uint32_t q, Between& between) const {
   const Eigen::AlignedBox3d hull = pieces_[p].box.merged(pieces_[q].box);
   const PlanarPolygon &i = pieces_[p].polygon, &j = pieces_[q].polygon;
-  for (std::uint32_t b = 0; b < pieces_.size(); ++b) {
-    const Piece& piece = pieces_[b];
-    if (b == p || b == q || piece.is_opening || !hull.intersects(piece.box)) continue;
-    switch (
-        shaft_occlusion(i.vertices, i.plane, j.vertices, j.plane, piece.blocker, tolerance_m_)) {
-      case ShaftOcclusion::full: return false;
-      case ShaftOcclusion::partial: blockers.push_back(&piece.blocker); break;
-      case ShaftOcclusion::none: break;
+  for (std::uint32_t s = 0; s < solids_.size(); ++s) {
+    const ConvexOccluder& solid = solids_[s];
+    // A face of a convex solid looks away from it.
+    if (s == solid_of_piece_[p] || s == solid_of_piece_[q] || !hull.intersects(solid.box)) continue;
+    const auto verdict =
+        shaft_occlusion(i.vertices, i.plane, j.vertices, j.plane, solid, tolerance_m_);
+    if (verdict == ShaftOcclusion::full) return false;
+    if (verdict == ShaftOcclusion::none) continue;
+    const std::size_t before = between.faces.size();
+    for (std::uint32_t member : solid.members) {
+      const Blocker& face = pieces_[member].blocker;
+      const auto of_face =
+          shaft_occlusion(i.vertices, i.plane, j.vertices, j.plane, face, tolerance_m_);
+      if (of_face == ShaftOcclusion::full) return false;
+      if (of_face == ShaftOcclusion::partial) between.faces.push_back(&face);
     }
+    if (between.faces.size() > before) between.solids.push_back(&solid);
   }
   return true;
 }
@@ -170,15 +210,16 @@ ViewFactorEstimate ViewFactors::between_pieces(std::uint32_t p, std::uint32_t q,
                                                const ViewFactorOptions& options) const {
   if (q < p) std::swap(p, q);
   const PlanarPolygon &i = pieces_[p].polygon, &j = pieces_[q].polygon;
-  std::vector<const Blocker*> blockers;
   ViewFactorEstimate hidden;
   hidden.method = ViewFactorMethod::hidden;
-  const bool visible = find_blockers(p, q, blockers);
+  Between between;
+  const bool visible = find_between(p, q, between);
+  const auto& [solids, blockers] = between;
   switch (options.method) {
     case ViewFactorMethod::analytic:
       return from_analytic(i, j, !visible || !blockers.empty(), options);
     case ViewFactorMethod::exact_visibility:
-      return visible ? from_exact_visibility(i, j, blockers, options) : hidden;
+      return visible ? from_exact_visibility(i, j, solids, blockers, options) : hidden;
     case ViewFactorMethod::ray_casting:
       return visible
                  ? from_rays(i, j, blockers, options, (std::uint64_t{p} << 32) | q, options.rays)
@@ -191,8 +232,8 @@ ViewFactorEstimate ViewFactors::between_pieces(std::uint32_t p, std::uint32_t q,
   }
   if (!visible) return hidden;
   if (blockers.empty()) return from_analytic(i, j, false, options);
-  if (!rays_are_cheaper(options, blockers.size()))
-    return from_exact_visibility(i, j, blockers, options);
+  if (!rays_are_cheaper(options, solids.size()))
+    return from_exact_visibility(i, j, solids, blockers, options);
   const double tolerance = options.relative_tolerance;
   return from_rays(i, j, blockers, options, (std::uint64_t{p} << 32) | q,
                    static_cast<int>(9.0 / (tolerance * tolerance)));

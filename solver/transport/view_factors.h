@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "scene/scene.h"
+#include "transport/convex_occluder.h"
 #include "transport/form_factor.h"
 #include "transport/visible_parts.h"
 
@@ -56,7 +57,8 @@ struct ViewFactorEstimate {
 /// View factors between the surfaces of a scene, occlusion included:
 ///   A_i F_ij = 1/pi integral_i integral_j V cos_i cos_j / r^2 dA_j dA_i.
 /// Surfaces may be concave, have holes, be bent or two-sided: they are sums over convex pieces, and
-/// a surface may see itself. Openings are seen but do not block. Coordinates are shifted to the
+/// a surface may see itself. Openings are seen but do not block; blocks hide as convex solids
+/// (convex_occluder) where exact visibility is found, polygon by polygon elsewhere. Coordinates are shifted to the
 /// scene's centre first, so a far origin costs no digits beyond those of the file's own numbers.
 class ViewFactors {
  public:
@@ -79,9 +81,18 @@ class ViewFactors {
 
   ViewFactorEstimate between_pieces(std::uint32_t p, std::uint32_t q,
                                     const ViewFactorOptions& options) const;
-  bool find_blockers(std::uint32_t p, std::uint32_t q, std::vector<const Blocker*>& blockers) const;
+  // What stands between two pieces: solids, and those of their faces that may hide something.
+  struct Between {
+    std::vector<const ConvexOccluder*> solids;
+    std::vector<const Blocker*> faces;
+  };
+
+  void find_solids();
+  bool find_between(std::uint32_t p, std::uint32_t q, Between& between) const;
 
   std::vector<Piece> pieces_;
+  std::vector<ConvexOccluder> solids_;        // members are pieces
+  std::vector<std::uint32_t> solid_of_piece_;
   std::vector<std::vector<std::uint32_t>> pieces_of_;  // of each surface
   std::vector<double> area_m2_;
   double tolerance_m_ = 0.0;  // of touching and coplanar pieces

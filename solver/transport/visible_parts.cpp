@@ -24,24 +24,31 @@ bool may_block(const Blocker& blocker, const Vec3& point, std::span<const Vec3> 
 
 void VisibleParts::remove_shadow(const Vec3& point, const Blocker& blocker) {
   rest_.clear();
+  sides_.clear();
   const double side = blocker.plane.distance_m(point) > 0.0 ? 1.0 : -1.0;
+  const Plane near{side * blocker.plane.normal, side * blocker.plane.offset_m};
   const std::size_t n = blocker.polygon.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3 a = blocker.polygon[i] - point, b = blocker.polygon[(i + 1) % n] - point;
+    const Vec3 outward = side * a.cross(b);
+    const double length = outward.norm();
+    if (length > 0.0) sides_.push_back({outward / length, outward.dot(point) / length});
+  }
   for (Polygon& part : parts_) {
+    if (misses(part, near, kTolerance * (part[0] - point).norm())) {
+      rest_.push_back(std::move(part));
+      continue;
+    }
     const std::size_t before = rest_.size();
     current_ = part;
-    for (std::size_t i = 0; i < n && !current_.empty(); ++i) {
-      const Vec3 a = blocker.polygon[i] - point, b = blocker.polygon[(i + 1) % n] - point;
-      const Vec3 outward = side * a.cross(b);
-      const double length = outward.norm();
-      if (length == 0.0) continue;
-      const Plane edge{outward / length, outward.dot(point) / length};
+    for (std::size_t i = 0; i < sides_.size() && !current_.empty(); ++i) {
+      const Plane& edge = sides_[i];
       const double tolerance = kTolerance * (current_[0] - point).norm();
       clip(current_, edge, tolerance, outside_);
       if (!outside_.empty()) rest_.push_back(outside_);
       clip(current_, Plane{-edge.normal, -edge.offset_m}, tolerance, inside_);
       current_.swap(inside_);
     }
-    const Plane near{side * blocker.plane.normal, side * blocker.plane.offset_m};
     const double tolerance = current_.empty() ? 0.0 : kTolerance * (current_[0] - point).norm();
     const bool is_hidden = std::any_of(current_.begin(), current_.end(), [&](const Vec3& v) {
       return near.distance_m(v) < -tolerance;
@@ -55,6 +62,15 @@ void VisibleParts::remove_shadow(const Vec3& point, const Blocker& blocker) {
     if (!outside_.empty()) rest_.push_back(outside_);
   }
   parts_.swap(rest_);
+}
+
+// Most blockers that may hide a part of the source hide nothing of most of its parts.
+bool VisibleParts::misses(const Polygon& part, const Plane& near, double tolerance) const {
+  const auto none_behind = [&](const Plane& plane) {
+    return std::none_of(part.begin(), part.end(),
+                        [&](const Vec3& v) { return plane.distance_m(v) < -tolerance; });
+  };
+  return none_behind(near) || std::any_of(sides_.begin(), sides_.end(), none_behind);
 }
 
 std::span<const Polygon> VisibleParts::operator()(const Vec3& point, std::span<const Vec3> source,

@@ -26,8 +26,10 @@ class VisibleParts {
 
  private:
   void remove_shadow(const Vec3& point, const Blocker& blocker);
+  bool misses(const Polygon& part, const Plane& near, double tolerance) const;
 
   std::vector<Polygon> parts_, rest_;
+  std::vector<Plane> sides_;  // of a shadow pyramid, what it hides behind them
   Polygon outside_, inside_, current_;
 };
 

@@ -20,21 +20,6 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Root mean square distance in the picture between where two cameras see the box's corners.
-double corner_error_px(const Scene& scene, const CameraDescription& a, const CameraDescription& b) {
-  double sum = 0.0, n = 0.0;
-  const Camera first(a), second(b);
-  for (const Surface& surface : scene.surfaces)
-    for (const Vec3& v : surface.pieces[0]) {
-      const auto p = first.project(v), q = second.project(v);
-      if (p.outcome != LensOutcome::ok || q.outcome != LensOutcome::ok) continue;
-      sum += std::pow(p.position.x_px - q.position.x_px, 2) +
-             std::pow(p.position.y_px - q.position.y_px, 2);
-      n += 1.0;
-    }
-  return std::sqrt(sum / n);
-}
-
 CameraDescription turned(CameraDescription camera, const Vec3& axis, double angle_deg) {
   const Eigen::Matrix3d r =
       Eigen::AngleAxisd(angle_deg * M_PI / 180.0, axis.normalized()).toRotationMatrix();
@@ -54,14 +39,6 @@ CameraDescription distorted_camera() {
 /// Light that falls off over each wall, as no flat colour does.
 double graded_shade(int surface, const Vec3& p) {
   return even_shade(surface, p) * (surface < 0 ? 1.0 : 0.7 + 0.1 * p[0] + 0.15 * p[1] - 0.1 * p[2]);
-}
-
-Image noisy(const Image& exact, double noise, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
-  Image image = exact;
-  for (float& v : image.channels[0].samples) v += static_cast<float>(noise * normal(random));
-  return image;
 }
 
 const Image& exact_photograph() {

@@ -35,14 +35,6 @@ CameraDescription lens_camera() {
   return camera;
 }
 
-Image noisy(const Image& exact, double noise, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
-  Image image = exact;
-  for (float& v : image.channels[0].samples) v += static_cast<float>(noise * normal(random));
-  return image;
-}
-
 const Image& photograph() {
   static const Image kImage = edge_picture(test_box(), lens_camera(), shadowed, 0.0, 1);
   return kImage;
@@ -57,21 +49,6 @@ RenderedView predicted(const Shade& shade) {
   Image picture = edge_picture(
       test_box(), camera, [&](int s, const Vec3& p) { return 7.0 * shade(s, p); }, 0.0, 2, 64);
   return RenderedView(std::move(picture), camera, geometry_aovs(test_box(), Camera(camera)));
-}
-
-/// rms distance of the box's corners in the picture.
-double corner_error_px(const CameraDescription& a, const CameraDescription& b) {
-  double sum = 0.0, n = 0.0;
-  const Camera first(a), second(b);
-  for (const Surface& surface : test_box().surfaces)
-    for (const Vec3& v : surface.pieces[0]) {
-      const auto p = first.project(v), q = second.project(v);
-      if (p.outcome != LensOutcome::ok || q.outcome != LensOutcome::ok) continue;
-      sum += std::pow(p.position.x_px - q.position.x_px, 2) +
-             std::pow(p.position.y_px - q.position.y_px, 2);
-      n += 1.0;
-    }
-  return std::sqrt(sum / n);
 }
 
 BoxAlignment from_edges(const Image& photo) {
@@ -103,8 +80,10 @@ TEST_P(IntervalsOfRefined, CoverTheTruthAndAreCloserThanThoseOfEdgesAlone) {
     ASSERT_EQ(edges.outcome, AlignmentOutcome::converged) << edges.message;
     const PhotometricRefinement found = refine_by_radiance(edges, view, photo, options);
     ASSERT_EQ(found.outcome, AlignmentOutcome::converged) << found.message;
-    edges2 += std::pow(corner_error_px(lens_camera(), edges.camera), 2) / double(trials);
-    light2 += std::pow(corner_error_px(lens_camera(), found.camera), 2) / double(trials);
+    edges2 +=
+        std::pow(corner_error_px(test_box(), lens_camera(), edges.camera), 2) / double(trials);
+    light2 +=
+        std::pow(corner_error_px(test_box(), lens_camera(), found.camera), 2) / double(trials);
     stated += found.refined_u_px / found.edge_u_px / double(trials);
     dispersion += found.dispersion / double(trials);
     const auto exact = values_of(camera_parameters(lens_camera(), found.parameters.centre_m));
@@ -191,7 +170,7 @@ TEST(RefineByRadiance, GainsOfEachSurfaceTakeUpWrongReflectances) {
   options.gain_per_surface = true;
   const PhotometricRefinement found = refine_by_radiance(edges, predicted(painted), photo, options);
   ASSERT_EQ(found.outcome, AlignmentOutcome::converged) << found.message;
-  EXPECT_LT(corner_error_px(lens_camera(), found.camera), 0.1);
+  EXPECT_LT(corner_error_px(test_box(), lens_camera(), found.camera), 0.1);
   double ceiling = 0.0, back = 0.0;  // surfaces 1 and 2
   for (const BandGain& g : found.bands) {
     if (g.surface == "ceiling") ceiling = g.gain;

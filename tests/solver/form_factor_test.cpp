@@ -181,6 +181,22 @@ TEST(ExchangeArea, HoldsABillionthAtTheExtremes) {
               1.0, 1e-9);
 }
 
+TEST(ExchangeArea, EndsWhereEdgesCrossUnderASmallAngle) {
+  // A wall whose foot crosses an edge of the floor in its middle. Halving towards all of the other
+  // edge instead of the crossing takes 1 : angle steps.
+  const Polygon floor = square(1.0, Vec3::Zero(), kX, kY);
+  const auto with_wall = [&](double angle) {
+    const Vec3 along(std::cos(angle), std::sin(angle), 0.0), corner = Vec3(0.5, 0, 0) - 0.8 * along;
+    return exchange_of(floor,
+                       {corner, corner + kZ, corner + kZ + 1.5 * along, corner + 1.5 * along});
+  };
+  const double parallel = with_wall(0.0);
+  ASSERT_GT(parallel, 0.1);
+  // A foot off by d changes the exchange by d ln d at most, and by rounding.
+  for (double angle : {1e-3, 1e-5, 1e-8, 1e-11, 1e-13, 1e-15})
+    EXPECT_NEAR(with_wall(angle), parallel, -angle * std::log(angle) + kKernelRounding) << angle;
+}
+
 TEST(ExchangeArea, FarPairsFollowThePointKernel) {
   constexpr double kDistance = 1e3;
   const Polygon low = square(1.0, {-0.5, -0.5, 0}, kX, kY);

@@ -111,4 +111,29 @@ inline Image edge_picture(const Scene& scene, const CameraDescription& descripti
   return image;
 }
 
+/// The picture with white noise.
+inline Image noisy(const Image& exact, double noise, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  Image image = exact;
+  for (float& v : image.channels[0].samples) v += static_cast<float>(noise * normal(random));
+  return image;
+}
+
+/// Root mean square distance in the picture between where two cameras see a scene's corners.
+inline double corner_error_px(const Scene& scene, const CameraDescription& a,
+                              const CameraDescription& b) {
+  double sum = 0.0, n = 0.0;
+  const Camera first(a), second(b);
+  for (const Surface& surface : scene.surfaces)
+    for (const Vec3& v : surface.pieces[0]) {
+      const auto p = first.project(v), q = second.project(v);
+      if (p.outcome != LensOutcome::ok || q.outcome != LensOutcome::ok) continue;
+      sum += std::pow(p.position.x_px - q.position.x_px, 2) +
+             std::pow(p.position.y_px - q.position.y_px, 2);
+      n += 1.0;
+    }
+  return std::sqrt(sum / n);
+}
+
 }  // namespace truebox
