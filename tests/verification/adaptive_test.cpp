@@ -197,7 +197,7 @@ TEST(PredictAdaptively, ServesAFittedReflectance) {
     std::printf("%s: a fit finds the red wall's reflectance off by %.2g %%\n", goal,
                 100.0 * error.back());
   }
-  EXPECT_LT(error[1], 0.75 * error[0]);  // half was seen, with 1000 elements too
+  EXPECT_LT(error[1], 0.75 * error[0]);  // two thirds was seen
 }
 
 TEST(InverseIrradiance, OfRmsIrradianceIsOneOverTheMeanEverywhere) {
