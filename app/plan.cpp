@@ -152,6 +152,7 @@ nlohmann::json plan_json(const Scene& scene, const Plan& plan, const std::string
                          {"exchange", exchanges[static_cast<int>(plan.exchange)]},
                          {"elements", plan.elements},
                          {"adapted", plan.mesh == PlannedMesh::adapted},
+                         {"discontinuities", plan.discontinuities},
                          {"paths_a_pixel", plan.paths},
                          {"estimated_processor_s", plan.processor_s},
                          {"estimated_bytes", plan.bytes},
@@ -264,6 +265,9 @@ void add_plan_command(CLI::App& program, Action& chosen) {
   auto* camera = command->add_option("--camera", a->camera, "what counts is what this camera sees");
   command->add_option("--surface", a->surface, "what counts is the mean of this surface")
       ->excludes(camera);
+  command->add_flag("--interpolated", a->wished.interpolated,
+                    "values are interpolated between corners, as viewers of .vtu and .glb do: "
+                    "whether elements should follow lines of light");
   command->add_option("--memory", a->wished.memory_MiB, "MiB that form factors or links may take")
       ->capture_default_str()
       ->check(CLI::Range(16, 1 << 24));

@@ -37,6 +37,7 @@ Plan plan_for(const Scene& scene, const PredictionArguments& wished) {
       *share_of(wished.target_error.empty() ? kDefaultTarget : wished.target_error);
   request.memory_limit_bytes = wished.memory_MiB << 20;
   request.progress = terminal_progress(wished.quiet);
+  request.interpolated = wished.interpolated;
   request.camera = camera_of(scene, wished.automatic);
   if (!wished.automatic.empty() && wished.automatic != kDefaultGoal)
     request.goal = goal_of(scene, wished.automatic);
@@ -63,6 +64,7 @@ PredictionArguments applied(const Plan& plan, const PredictionArguments& wished)
     a.form_factors = plan.form_factors == FormFactorMethod::exact_visibility ? "exact-visibility"
                                                                              : "ray-casting";
   }
+  a.discontinuities = plan.discontinuities;
   if (plan.mesh == PlannedMesh::adapted)
     a.adaptive = wished.automatic.empty() ? kDefaultGoal : wished.automatic;
   return a;
@@ -83,6 +85,7 @@ std::string command_line(const Plan& plan, const PredictionArguments& a) {
     line += fmt::format(" --solver-bound {:g}", a.relative_bound);
   if (!a.adaptive.empty())
     line += a.adaptive == kDefaultGoal ? " --adaptive" : " --adaptive=" + a.adaptive;
+  if (a.discontinuities) line += " --discontinuities";
   if (a.bands > 0) line += fmt::format(" --bands {}", a.bands);
   if (a.memory_MiB != usual.memory_MiB) line += fmt::format(" --memory {}", a.memory_MiB);
   return line;

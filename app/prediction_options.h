@@ -35,6 +35,7 @@ struct PredictionArguments {
   std::string target_error;   ///< "0.5%" or "0.005": chooses elements and solver bound
   std::string adaptive;       ///< empty: uniform; else the goal, or kDefaultGoal
   bool gather_edges = false;  ///< the gathered field, see PredictOptions::gathered_up_to
+  bool interpolated = false;  ///< the answer is interpolated between corners: for --auto
   /// "smooth", "constant", "averaged" or "least-squares"; empty where nothing was said: smooth
   std::string reconstruction;
   bool discontinuities = false;  ///< elements follow lines of light and shadow

@@ -192,7 +192,9 @@ int solve_here(const SolveArguments& a, Ranks* ranks) {
   if (!a.output.empty() && writer == writers().end())
     throw InputError(a.output, 0, "an output ending in .json, .vtu, .glb or .html",
                      std::filesystem::path(a.output).extension().string());
-  const auto predicted = predict(a.prediction);
+  PredictionArguments asked = a.prediction;
+  asked.interpolated = !a.output.empty() && !a.output.ends_with(".json");
+  const auto predicted = predict(asked);
   if (ranks && !ranks->is_first()) return kAgrees;  // the first rank says and writes all
   fmt::print("{}", describe(*predicted));
   if (ranks) fmt::print("{}", ranks->describe());

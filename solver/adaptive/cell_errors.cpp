@@ -35,7 +35,7 @@ double length_over_width(const Polygon& p, int direction) {
   return direction == 0 ? u / v : v / u;
 }
 
-// How much of each quarter (in the order of CellTree::quarters) lies in a cell's first half.
+// How much of each quarter (in the order of CellTree::mesh) lies in a cell's first half.
 std::array<double, 4> first_half(std::size_t corners, int direction) {
   if (corners == 4) return direction == 0 ? std::array{1., 1., 0., 0.} : std::array{1., 0., 1., 0.};
   std::array<double, 4> share = {0.5, 0.5, 0.5, 0.5};
@@ -214,17 +214,18 @@ BandMatrix errors_between(const CellTree& cells, const Quarters& q, const Goal& 
   BandMatrix error = q.indirect;
   tbb::parallel_for(tbb::blocked_range<Index>(0, n), [&](const auto& range) {
     Eigen::VectorXd value(q.indirect.cols());
+    Polygon quarter;
     for (Index i = range.begin(); i < range.end(); ++i) {
       if (!usable[static_cast<std::size_t>(i)]) {
         error.middleRows(4 * i, 4).setZero();
         continue;
       }
-      const auto cell = q.cell_of[static_cast<std::size_t>(4 * i)];
-      const auto parts = CellTree::quarters(cells.cell(cell).corners, 2);
-      for (Index k = 0; k < 16; ++k) {
-        field.evaluate(static_cast<std::uint32_t>(i), centroid(parts[static_cast<std::size_t>(k)]),
-                       value);
-        error.row(4 * i + k / 4) -= 0.25 * value.transpose();
+      for (Index k = 4 * i; k < 4 * i + 4; ++k) {
+        q.mesh.polygon_of(q.mesh.patches[static_cast<std::size_t>(k)], quarter);
+        for (const Polygon& part : CellTree::quarters(quarter)) {
+          field.evaluate(static_cast<std::uint32_t>(i), centroid(part), value);
+          error.row(k) -= 0.25 * value.transpose();
+        }
       }
     }
   });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -10,7 +11,10 @@ namespace truebox {
 
 /// Elements of unequal size: triangles and quads that cover the scene's pieces, halved one by one
 /// in the direction that is asked for, so that they can be long beside an edge and short across it.
-/// Neighbours may differ by any number of halvings; hanging_vertices finds what that leaves.
+/// A quad with one side where surfaces meet (meeting_lines) is cut at a quarter of its width from
+/// there, not in the middle: there radiosity behaves like B0 + c x^lambda, and elements that shrink
+/// geometrically follow that with few cuts (Rice 1969). Neighbours may differ by any number of
+/// halvings; hanging_vertices finds what that leaves.
 class CellTree {
  public:
   struct Cell {
@@ -31,18 +35,20 @@ class CellTree {
 
   /// How many ways there are to halve a cell: 2 of a quad, 3 of a triangle.
   static int directions(const Polygon& corners) { return corners.size() == 4 ? 2 : 3; }
-  /// Halves of a quad across its edges 0-1 and 2-3 (direction 0) or 1-2 and 3-0 (1); of a triangle
-  /// from the middle of edge k to the corner opposite (k).
-  static std::pair<Polygon, Polygon> halves(const Polygon& corners, int direction);
+  /// A quad cut across its edges 0-1 and 2-3 (direction 0) or 1-2 and 3-0 (1) at `share` of their
+  /// length; a triangle from the middle of edge k to the corner opposite (k).
+  static std::pair<Polygon, Polygon> halves(const Polygon& corners, int direction,
+                                            double share = 0.5);
 
-  /// The cell cut in four `level` times, the four parts of a part together: of a quad those at its
-  /// corners 0, 3, 1, 2; of a triangle those at its corners 0, 1, 2 and the middle.
-  static std::vector<Polygon> quarters(const Polygon& corners, int level);
+  /// A polygon cut in four in the middle: of a quad the parts at its corners 0, 3, 1, 2; of a
+  /// triangle those at its corners 0, 1, 2 and the middle.
+  static std::vector<Polygon> quarters(const Polygon& corners);
 
   /// Replaces a cell by its halves: cell i becomes the first, a new last cell the second.
   void halve(std::size_t i, int direction);
 
-  /// The elements: each cell cut in four `level` times. Elements of cell i are those that
+  /// The elements: each cell cut in four `level` times, narrower where surfaces meet; the four
+  /// parts of a part together, in the order of `quarters`. Elements of cell i are those that
   /// `cell_of` says.
   PatchMesh mesh(int level, std::vector<std::uint32_t>* cell_of = nullptr) const;
 
@@ -51,11 +57,16 @@ class CellTree {
     std::size_t surface;
     Polygon polygon;
     std::vector<ContactLine> contacts;
+    std::vector<ContactLine> meeting;  // where the radiosity is singular
   };
   const Scene* scene_;
   std::vector<Place> pieces_;
   std::vector<Cell> cells_;
 
+  static void cut_in_four(const Polygon& p, const std::array<double, 2>& share,
+                          std::vector<Polygon>& parts);
+  double share_of(std::uint32_t piece, const Polygon& p, int direction) const;
+  std::vector<Polygon> parts(std::size_t i, int level) const;
   void add_places();
   void add_cells(std::uint32_t piece, const std::vector<Polygon>& cells);
 };

@@ -18,6 +18,8 @@ struct PlanRequest {
   /// What counts: nothing for all surfaces alike, else what the mesh is refined for.
   std::optional<Goal> goal;
   std::optional<CameraDescription> camera;  ///< whose picture is wanted
+  /// Values are interpolated between corners of elements, as viewers of .vtu and .glb do.
+  bool interpolated = false;
   std::size_t memory_limit_bytes = std::size_t{8} << 30;
   Progress progress;
 
@@ -63,11 +65,12 @@ struct Plan {
   PlannedMesh mesh = PlannedMesh::uniform;
   PlannedExchange exchange = PlannedExchange::full_matrix;
   FormFactorMethod form_factors = FormFactorMethod::ray_casting;
+  bool discontinuities = false;  ///< elements follow lines of light
   std::size_t elements = 0;
   double solver_bound = 1e-7;
   double link_tolerance = 0.0;   ///< hierarchical
   int paths = 0;                 ///< a pixel
-  std::size_t bands_solved = 0;  ///< by themselves, not on a basis that bands share
+  std::size_t bands_solved = 0;  ///< by themselves, not from products of others
   double processor_s = 0.0;      ///< estimate, to a factor of three; 0: unknown
   std::size_t bytes = 0;         ///< of form factors or links
 

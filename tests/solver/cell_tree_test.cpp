@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -97,6 +98,38 @@ TEST(CellTree, FindsHangingVerticesWhereOneCellWasHalved) {
   ASSERT_EQ(hanging.size(), 1u);
   EXPECT_NEAR(hanging[0].share, 0.5, kRounding);
   EXPECT_NEAR((mesh.vertices[hanging[0].vertex] - Vec3(0.25, 0.5, 0)).norm(), 0.0, kRounding);
+}
+
+// Corners of a mesh on a piece, along x.
+std::vector<double> widths_along_x(const CellTree& cells, std::uint32_t piece) {
+  std::vector<double> x;
+  const PatchMesh mesh = cells.mesh(0);
+  for (const Patch& patch : mesh.patches)
+    if (patch.piece == piece)
+      for (std::uint32_t v : mesh.corners_of(patch)) x.push_back(mesh.vertices[v].x());
+  std::sort(x.begin(), x.end());
+  x.erase(std::unique(x.begin(), x.end(), [](double a, double b) { return b - a < kRounding; }),
+          x.end());
+  return x;
+}
+
+TEST(CellTree, CutsAtAQuarterFromWhereSurfacesMeetAndInTheMiddleElsewhere) {
+  Scene scene = tiny::grey_scene(0.5);
+  tiny::add_surface(scene, "floor", {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
+  tiny::add_surface(scene, "wall", {{0, 0, 0}, {0, 1, 0}, {0, 1, 1}, {0, 0, 1}});  // faces +x
+  CellTree cells(scene, 1.0);
+  ASSERT_EQ(cells.size(), 2u);
+  cells.halve(0, 0);
+  EXPECT_THAT(widths_along_x(cells, 0),
+              testing::Pointwise(testing::DoubleNear(kRounding), {0.0, 0.25, 1.0}));
+  const CellTree once = cells;
+  cells.halve(0, 0);  // the part at the wall
+  EXPECT_THAT(widths_along_x(cells, 0),
+              testing::Pointwise(testing::DoubleNear(kRounding), {0.0, 0.0625, 0.25, 1.0}));
+  cells = once;
+  cells.halve(2, 0);  // the part that touches nothing
+  EXPECT_THAT(widths_along_x(cells, 0),
+              testing::Pointwise(testing::DoubleNear(kRounding), {0.0, 0.25, 0.625, 1.0}));
 }
 
 TEST(CellTree, LeavesNoCracksInTheFieldsOfRandomRefinement) {

@@ -2,13 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <random>
 
 #include "planning/full_model.h"
+#include "planning/line_pilot.h"
 #include "planning/plan.h"
 #include "scene/generated_scene.h"
 #include "scene/scene_file.h"
+#include "support/penumbra_scene.h"
 #include "support/scratch.h"
 #include "support/tiny_scenes.h"
 #include "transport/enclosure.h"
@@ -168,6 +171,24 @@ TEST(Plan, LeavesInterreflectionOutWhereNothingReflects) {
   const auto claims = check_claims(room, plan, 300);
   ASSERT_FALSE(claims.empty());
   for (const ClaimCheck& claim : claims) EXPECT_TRUE(claim.holds()) << claim.difference;
+}
+
+TEST(Plan, FollowsLinesOfLightOnlyWhereInterpolationGainsByThem) {
+  tiny::PenumbraScene shadow;
+  Scene scene = shadow.scene();
+  tiny::add_surface(scene, "wall", {{-2, -2, 0}, {-2, 2, 0}, {-2, 2, 2}, {-2, -2, 2}});  // indirect
+  PlanRequest request = target(0.1);
+  Plan plan = make_plan(scene, request);
+  EXPECT_FALSE(plan.discontinuities);  // nobody interpolates
+  EXPECT_EQ(decision(plan, "lines of light").error_kind, ErrorKind::none);
+  request.interpolated = true;
+  plan = make_plan(scene, request);
+  EXPECT_TRUE(plan.discontinuities);
+  const LinePilot pilot = fly_line_pilot(scene, 1600, nullptr);
+  std::printf("direct light interpolated: %.3g without lines (%zu), %.3g along %zu lines (%zu)\n",
+              pilot.error, pilot.elements, pilot.error_along, pilot.lines, pilot.elements_along);
+  EXPECT_GE(pilot.lines, 8u);  // borders of umbra and penumbra
+  EXPECT_LT(pilot.error_along, 0.8 * pilot.error);
 }
 
 TEST(Plan, FindsTheBandsOfFewMaterialsOnABasis) {

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What elements, and what is kept between them.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "hierarchy/hierarchical_exchange.h"
+#include "planning/line_pilot.h"
+#include "planning/plan_text.h"
+#include "planning/planner.h"
+
+namespace truebox {
+
+using plan_text::count;
+using plan_text::mebibytes;
+using plan_text::percent;
+using plan_text::seconds;
+
+namespace {
+
+constexpr double kAdaptingPaysFrom = 1500.0;  // elements; measured, solver/README.md
+constexpr double kCoarseLinks = 0.1, kFineLinks = 1e-2;
+constexpr double kStreamedMatrices =
+    40.0;  // what passes over rows made anew take; solver/README.md
+constexpr double kStreamingPatience_s = 600.0;  // of processor time; longer, and links are better
+constexpr std::size_t kLinePilotElements = 1600, kMostAlongLines = 40000;
+constexpr double kLinesPayBelow = 0.8;  // of the error without: lines cost time and odd elements
+constexpr double kLinksBound = 3.0;     // what a bound holds of the links' own estimate
+
+}  // namespace
+
+void Planner::decide_mesh_unforetold() {
+  plan_.elements = static_cast<std::size_t>(least_elements());
+  Decision d{"mesh", "uniform, " + count(plan_.elements) + " elements",
+             "so many resolve each of " + count(pieces()) +
+                 " pieces on three grids; too many for a pilot, so the error is not foretold"};
+  d.error_kind = ErrorKind::estimate;
+  d.error = std::numeric_limits<double>::quiet_NaN();
+  d.error_of = "mean irradiance of a surface";
+  add(std::move(d));
+}
+
+void Planner::adapt_if_it_pays(const Pilot& uniform, MeshChoice& choice) {
+  if (choice.elements <= kAdaptingPaysFrom) {
+    choice.why += "; an adapted mesh does not pay below " + count(kAdaptingPaysFrom) + " elements";
+    return;
+  }
+  fly(request_.goal ? request_.goal : Goal{});
+  const double adapted =
+      std::max(plan_.pilot->elements_for(request_.target_error), least_elements());
+  const double adapted_s = plan_.pilot->processor_s_for(adapted);
+  const double uniform_s = uniform.processor_s_for(choice.uniform_elements);
+  choice.why += "; adapted: " + percent(plan_.pilot->relative_bound) + " with " +
+                count(plan_.pilot->elements) + " elements, so " + count(adapted) +
+                " foretold and " + seconds(adapted_s) + " instead of " +
+                count(choice.uniform_elements) + " and " + seconds(uniform_s);
+  if (request_.goal || adapted_s < uniform_s) {
+    plan_.mesh = PlannedMesh::adapted;
+    choice.elements = adapted;
+  } else {
+    plan_.pilot = uniform;
+  }
+}
+
+void Planner::fit_memory(const Pilot& uniform, MeshChoice& choice) {
+  const double fits =
+      std::floor(std::sqrt(static_cast<double>(request_.memory_limit_bytes) / sizeof(double)));
+  const double streamed_s = kStreamedMatrices * uniform.processor_s_for(choice.uniform_elements);
+  if (choice.elements > fits && streamed_s <= kStreamingPatience_s) {
+    plan_.exchange = PlannedExchange::streamed;
+    plan_.mesh = PlannedMesh::uniform;
+    plan_.pilot = uniform;
+    choice.elements = choice.uniform_elements;
+  } else if (choice.elements > fits && fits > least_elements() &&
+             plan_.pilot->bound_for(fits) < kLinksBound * request_.target_error) {
+    choice.error = plan_.pilot->bound_for(fits);
+    choice.why += "; " + count(choice.elements) + " do not fit the memory, " + count(fits) +
+                  " do and are not foretold to meet the target";
+    choice.elements = fits;
+  }
+  plan_.processor_s = plan_.exchange == PlannedExchange::streamed
+                          ? streamed_s
+                          : plan_.pilot->processor_s_for(choice.elements);
+}
+
+void Planner::decide_mesh() {
+  if (!plan_.pilot) return decide_mesh_unforetold();
+  const Pilot uniform = *plan_.pilot;
+  MeshChoice choice;
+  choice.uniform_elements = choice.elements =
+      std::max(uniform.elements_for(request_.target_error), least_elements());
+  choice.why = "the pilot's bound of " + percent(uniform.relative_bound) + " with " +
+               count(uniform.elements) + " elements falls like elements^(-3/4)";
+  adapt_if_it_pays(uniform, choice);
+  choice.error = choice.elements > least_elements()
+                     ? request_.target_error
+                     : std::min(request_.target_error, plan_.pilot->bound_for(choice.elements));
+  fit_memory(uniform, choice);
+  plan_.elements = static_cast<std::size_t>(std::min(choice.elements, 1e9));
+  const bool is_adapted = plan_.mesh == PlannedMesh::adapted;
+  Decision d{"mesh", (is_adapted ? "adapted, " : "uniform, ") + count(plan_.elements) + " elements",
+             std::move(choice.why)};
+  d.left_out = is_adapted ? "small elements where the light is even" : "adaptive subdivision";
+  d.work = "elements";
+  d.planned_work = choice.elements;
+  d.full_work = choice.uniform_elements;
+  d.error_kind = ErrorKind::bound;
+  d.error = mesh_error_ = choice.error;
+  d.error_of = "mean irradiance of a surface";
+  add(std::move(d));
+}
+
+// What interpolates between corners shows lines of light where elements follow them: measured, not
+// assumed, because few elements have no room for many lines.
+void Planner::decide_lines() {
+  if (!plan_.needs.occlusion) return;
+  Decision d{"lines of light", "not followed", ""};
+  d.left_out = "elements along outlines of shadows (--discontinuities)";
+  d.error_of = "irradiance interpolated between corners, rms over the area";
+  if (!request_.interpolated) {
+    d.why =
+        "direct light is exact at every point and indirect light does not know them; files whose "
+        "values are interpolated between corners gain (--interpolated)";
+    return add(std::move(d));
+  }
+  if (!plan_.pilot || plan_.exchange == PlannedExchange::hierarchical ||
+      plan_.elements > kMostAlongLines) {
+    d.why = "too many elements or pieces to look for lines";
+    d.error_kind = ErrorKind::estimate;
+    d.error = std::numeric_limits<double>::quiet_NaN();
+    return add(std::move(d));
+  }
+  const Goal goal = request_.goal ? *request_.goal : Goal{};
+  const bool is_adapted = plan_.mesh == PlannedMesh::adapted;
+  const LinePilot pilot = fly_line_pilot(scene_, std::min(plan_.elements, kLinePilotElements),
+                                         is_adapted ? &goal : nullptr);
+  plan_.discontinuities = pilot.error_along < kLinesPayBelow * pilot.error;
+  d.why = "direct light interpolated between corners is off by " + percent(pilot.error) + " with " +
+          count(pilot.elements) + " elements, by " + percent(pilot.error_along) + " with " +
+          count(pilot.elements_along) + " that follow " + count(pilot.lines) + " lines";
+  if (plan_.discontinuities) {
+    d.choice = "followed by the elements";
+    d.left_out.clear();
+  }
+  d.error_kind = ErrorKind::estimate;
+  d.error = plan_.discontinuities ? pilot.error_along : pilot.error;
+  d.error_of = "direct light interpolated between corners, rms over the area, with " +
+               count(pilot.elements) + " elements";
+  add(std::move(d));
+}
+
+// Measured orders: tests/verification/basis_convergence_test.cpp.
+void Planner::decide_basis() {
+  Decision d{"basis", "constants, and a continuous field of quadratics between them", ""};
+  d.why = plan_.needs.occlusion
+              ? "light has kinks at shadows, where a higher degree gains nothing on elements that "
+                "do not follow them"
+              : "edges where surfaces meet leave every degree of first order on even elements; "
+                "means, which are bound here, converge twice as fast";
+  d.left_out = "polynomials of degree 1 to 4 (solve --basis, where nothing is hidden)";
+  d.error_kind = ErrorKind::bound;
+  d.error = plan_.pilot ? mesh_error_ : std::numeric_limits<double>::quiet_NaN();
+  d.error_of = "mean irradiance of a surface, together with the mesh";
+  add(std::move(d));
+}
+
+void Planner::decide_exchange() {
+  const double n = static_cast<double>(plan_.elements);
+  const double matrix_bytes = n * n * sizeof(double);
+  Decision d{"exchange", "", ""};
+  d.work = "MiB";
+  d.full_work = matrix_bytes / (1 << 20);
+  if (matrix_bytes <= static_cast<double>(request_.memory_limit_bytes)) {
+    plan_.bytes = static_cast<std::size_t>(matrix_bytes);
+    d.choice = "full matrix, " + mebibytes(matrix_bytes);
+    d.why = "fits the limit of " + mebibytes(static_cast<double>(request_.memory_limit_bytes)) +
+            ", and its bound is one; that of links is an estimate";
+    d.planned_work = d.full_work;
+  } else if (plan_.exchange == PlannedExchange::streamed) {
+    plan_.bytes = static_cast<std::size_t>(3.0 * n * sizeof(double) *
+                                           static_cast<double>(scene_.bands.size()));
+    d.choice = "streamed: rows made anew for each pass, about " +
+               mebibytes(static_cast<double>(plan_.bytes));
+    d.why = "a matrix takes " + mebibytes(matrix_bytes) + ", above the limit of " +
+            mebibytes(static_cast<double>(request_.memory_limit_bytes)) +
+            "; without it the passes take " + seconds(plan_.processor_s) +
+            ", and the bound stays one";
+    d.left_out = "the matrix";
+    d.planned_work = static_cast<double>(plan_.bytes) / (1 << 20);
+  } else {
+    exchange_by_links(matrix_bytes, d);
+  }
+  add(std::move(d));
+}
+
+void Planner::exchange_by_links(double matrix_bytes, Decision& d) {
+  plan_.exchange = PlannedExchange::hierarchical;
+  plan_.mesh = PlannedMesh::uniform;
+  // Without a pilot nobody knows what finer links are worth beside the grid's own error.
+  plan_.link_tolerance =
+      plan_.pilot ? std::clamp(request_.target_error, kFineLinks, kCoarseLinks) : kCoarseLinks;
+  HierarchyOptions options{plan_.link_tolerance, request_.memory_limit_bytes};
+  if (estimated_bytes(plan_.elements, options) > request_.memory_limit_bytes)
+    plan_.link_tolerance = options.relative_tolerance = kCoarseLinks;
+  plan_.bytes = estimated_bytes(plan_.elements, options);
+  d.choice = "hierarchical, links of " + percent(plan_.link_tolerance) + ", about " +
+             mebibytes(static_cast<double>(plan_.bytes));
+  d.why = "a matrix takes " + mebibytes(matrix_bytes) + ", above the limit of " +
+          mebibytes(static_cast<double>(request_.memory_limit_bytes));
+  d.left_out = "what is too faint to be worth a link of its own";
+  d.planned_work = static_cast<double>(plan_.bytes) / (1 << 20);
+  d.error_kind = ErrorKind::estimate;
+  d.error = plan_.link_tolerance;
+  d.error_of = "irradiance, rms over the area";
+  plan_.processor_s = 0.0;  // the pilot's law is that of a matrix
+}
+
+}  // namespace truebox
