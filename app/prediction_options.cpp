@@ -71,6 +71,13 @@ const std::map<std::string, Reconstruction>& reconstructions() {
   return kNames;
 }
 
+ClosureRepair repair_of(const PredictionArguments& a) {
+  if (a.repair == "scaling") return ClosureRepair::scaling;
+  if (a.form_factors == "streamed" || a.form_factors == "hierarchical" || a.solve_grid)
+    throw InputError("--repair", 0, "scaling where no matrix is kept in this process", a.repair);
+  return a.repair == "none" ? ClosureRepair::none : ClosureRepair::least_squares;
+}
+
 }  // namespace
 
 void add_prediction_options(CLI::App& command, PredictionArguments& a,
@@ -97,6 +104,12 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
                   "elements, for many elements")
       ->capture_default_str()
       ->check(CLI::IsMember({"exact-visibility", "ray-casting", "streamed", "hierarchical"}));
+  command
+      .add_option("--repair", a.repair,
+                  "of closed scenes: how partly hidden factors are changed until rows sum to one: "
+                  "scaling (Sinkhorn), least-squares (the least relative changes) or none")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"scaling", "least-squares", "none"}));
   command
       .add_option("--link-tolerance", a.link_tolerance,
                   "hierarchical: share of the mean irradiance that links may leave out, rms")
@@ -180,6 +193,7 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
   options.elements = a.elements;
   options.form_factors.rays = a.rays;
   if (a.form_factors == "ray-casting") options.form_factors.method = FormFactorMethod::ray_casting;
+  options.form_factors.repair = repair_of(a);
   if (a.form_factors == "streamed") {
     options.find_exchange = streamed_exchange;
     options.solve.share_bands = false;  // every pass makes the matrix anew, for one band or for all
@@ -262,6 +276,19 @@ double fitted_exponent(const Prediction& prediction, double (*cost)(const LinkSu
   return (n * xy - x * y) / (n * xx - x * x);
 }
 
+std::string describe_repair(const FormFactorSummary& f) {
+  switch (f.repair) {
+    case ClosureRepair::none: return "left as they are";
+    case ClosureRepair::scaling:
+      return fmt::format("partly hidden factors scaled by at most {:.1e}", f.repair_max);
+    case ClosureRepair::least_squares: break;
+  }
+  return fmt::format(
+      "partly hidden factors changed by {:.1e} rms and {:.1e} at most, the least that will do "
+      "({} came out below 0 and were set to 0)",
+      f.repair_rms, f.repair_max, f.repair_negative);
+}
+
 std::string describe_links(const Prediction& prediction) {
   const LinkSummary& links = *prediction.fine().links;
   return fmt::format(
@@ -322,14 +349,13 @@ std::string describe(const Predicted& p) {
   if (f.covered_patches > 0)
     text += fmt::format("  {} elements lie partly under another surface: their free parts count\n",
                         f.covered_patches);
-  text +=
-      f.closed
-          ? fmt::format(
-                "  closure: none of {} rays escaped; row sums off by {:.1e} mean, {:.1e} "
-                "max; partly hidden factors scaled by at most {:.1e}, then off by {:.1e}\n",
-                f.closure_rays, f.closure_error_mean, f.closure_error_max, f.repair_max,
-                f.closure_residual_max)
-          : fmt::format("  the scene is open (no repair); largest row sum {:.6f}\n", f.row_sum_max);
+  text += f.closed ? fmt::format(
+                         "  closure: none of {} rays escaped; row sums off by {:.1e} mean, {:.1e} "
+                         "max; {}, then off by {:.1e}\n",
+                         f.closure_rays, f.closure_error_mean, f.closure_error_max,
+                         describe_repair(f), f.closure_residual_max)
+                   : fmt::format("  the scene is open (no repair); largest row sum {:.6f}\n",
+                                 f.row_sum_max);
   text += "  radiosity: " + grid.solve.brief() + "\n";
   if (const auto& shares = p.prediction->error_shares())
     text += fmt::format("  mean error bound: grids {:.2g} %, form factors {:.1g} %, {} {:.1g} %\n",

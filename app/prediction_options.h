@@ -38,8 +38,9 @@ struct PredictionArguments {
   bool interpolated = false;  ///< the answer is interpolated between corners: for --auto
   /// "smooth", "constant", "averaged" or "least-squares"; empty where nothing was said: smooth
   std::string reconstruction;
-  bool discontinuities = false;  ///< elements follow lines of light and shadow
-  std::size_t bands = 0;         ///< lamp-weighted ones instead of the scene's; 0: the scene's
+  std::string repair = "scaling";  ///< or "least-squares" or "none"
+  bool discontinuities = false;    ///< elements follow lines of light and shadow
+  std::size_t bands = 0;           ///< lamp-weighted ones instead of the scene's; 0: the scene's
   std::string automatic;  ///< empty: as said here; else as planned, for a goal or kDefaultGoal
   bool error_shares = false, sensitivities = false;  ///< as in PredictOptions
   SolveGrid solve_grid;                              ///< as in PredictOptions, and:

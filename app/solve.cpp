@@ -40,6 +40,11 @@ Observer observer() {
       "CIE 1931 2 deg");
 }
 
+const char* name_of(ClosureRepair repair) {
+  if (repair == ClosureRepair::none) return "none";
+  return repair == ClosureRepair::scaling ? "scaling" : "least-squares";
+}
+
 std::vector<double> values(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
 
 // One entry a grid, the finest first: what a fit of cost against size needs.
@@ -88,7 +93,9 @@ nlohmann::json summary_json(const Predicted& p) {
             {"closed", f.closed},
             {"closure_error_max", f.closure_error_max},
             {"closure_error_mean", f.closure_error_mean},
+            {"repair", name_of(f.repair)},
             {"repair_max", f.repair_max},
+            {"repair_rms", f.repair_rms},
             {"closure_residual_max", f.closure_residual_max}}},
           {"links", links_json(*p.prediction)},
           {"solver",

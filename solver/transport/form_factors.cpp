@@ -44,6 +44,21 @@ void leave_out_outside(FormFactors& factors, const Eigen::VectorXd& row_sums) {
       leave_out(factors, i);
 }
 
+// Changes sampled entries only, and writes down by how much.
+void repair(FormFactors& factors, const std::vector<char>& usable,
+            const std::vector<std::vector<std::uint32_t>>& sampled, ClosureRepair method) {
+  const ClosureReport report =
+      repair_closure(factors.exchange_area_m2, factors.area_m2, usable, sampled, method);
+  FormFactorSummary& summary = factors.summary;
+  summary.repair = method;
+  summary.closure_error_max = report.error_before_max;
+  summary.closure_error_mean = report.error_before_rms;
+  summary.repair_max = report.change_max;
+  summary.repair_rms = report.change_rms;
+  summary.repair_negative = report.negative;
+  summary.closure_residual_max = report.error_after_max;
+}
+
 class Builder {
  public:
   Builder(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
@@ -96,7 +111,7 @@ class Builder {
         if (result.usable[static_cast<std::size_t>(i)] && !whole_[static_cast<std::size_t>(i)])
           covered.push_back(i);
       result.summary.covered_patches = covered.size();
-      repair(result);
+      repair(result, whole_, sampled_, options_.repair);
       for (Eigen::Index i : covered) result.area_m2[i] = result.exchange_area_m2.col(i).sum();
     }
     result.summary.row_sum_max = 0.0;
@@ -242,63 +257,6 @@ class Builder {
     }
   }
 
-  // Scales only sampled entries, S_ij <- x_i x_j S_ij, until each row sums to its area.
-  void repair(FormFactors& factors) const {
-    const Eigen::Index n = factors.size();
-    Eigen::VectorXd exact(n), noisy = Eigen::VectorXd::Zero(n), x = Eigen::VectorXd::Ones(n);
-    for (Eigen::Index i = 0; i < n; ++i) exact[i] = factors.exchange_area_m2.col(i).sum();
-    const auto for_each_sampled = [&](const auto& visit) {
-      for (std::size_t i = 0; i < sampled_.size(); ++i)
-        for (std::uint32_t j : sampled_[i])
-          visit(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-    };
-    record_closure(factors, exact);
-    for_each_sampled([&](auto i, auto j) {
-      exact[i] -= factors.exchange_area_m2(j, i);
-      exact[j] -= factors.exchange_area_m2(j, i);
-    });
-    for (int sweep = 0; sweep < 50; ++sweep) {
-      noisy.setZero();
-      for_each_sampled([&](auto i, auto j) {
-        noisy[i] += factors.exchange_area_m2(j, i) * x[j];
-        noisy[j] += factors.exchange_area_m2(j, i) * x[i];
-      });
-      double change = 0.0;
-      for (Eigen::Index i = 0; i < n; ++i) {
-        // Rows whose sampled share is tiny cannot be mended through it.
-        if (!whole_[static_cast<std::size_t>(i)] || noisy[i] < 1e-3 * factors.area_m2[i]) continue;
-        const double wanted = std::clamp((factors.area_m2[i] - exact[i]) / noisy[i], 0.5, 2.0);
-        const double next = std::sqrt(x[i] * wanted);
-        change = std::max(change, std::abs(next - x[i]));
-        x[i] = next;
-      }
-      if (change < 1e-12) break;
-    }
-    for_each_sampled([&](auto i, auto j) {
-      factors.summary.repair_max =
-          std::max(factors.summary.repair_max, std::abs(x[i] * x[j] - 1.0));
-      factors.exchange_area_m2(j, i) *= x[i] * x[j];
-      factors.exchange_area_m2(i, j) = factors.exchange_area_m2(j, i);
-    });
-    for (Eigen::Index i = 0; i < n; ++i)
-      if (whole_[static_cast<std::size_t>(i)])
-        factors.summary.closure_residual_max =
-            std::max(factors.summary.closure_residual_max,
-                     std::abs(factors.exchange_area_m2.col(i).sum() / factors.area_m2[i] - 1.0));
-  }
-
-  void record_closure(FormFactors& factors, const Eigen::VectorXd& row_sums) const {
-    double weighted = 0.0, area = 0.0;
-    for (Eigen::Index i = 0; i < factors.size(); ++i) {
-      if (!whole_[static_cast<std::size_t>(i)]) continue;
-      const double error = std::abs(row_sums[i] / factors.area_m2[i] - 1.0);
-      factors.summary.closure_error_max = std::max(factors.summary.closure_error_max, error);
-      weighted += error * factors.area_m2[i];
-      area += factors.area_m2[i];
-    }
-    factors.summary.closure_error_mean = weighted / area;
-  }
-
   const PatchMesh& mesh_;
   const Scene& scene_;
   const Visibility& visibility_;
@@ -367,12 +325,7 @@ FormFactors without_rays(const PatchMesh& mesh, const Scene& scene, const Visibi
       if (!tested[k]) covered.push_back(i);
       if (!tested[k] || std::abs(row_sums[i] - 1.0) > kUnmendableRow) whole[k] = 0;
     }
-    const ClosureReport report = repair_closure(result.exchange_area_m2, result.area_m2, whole,
-                                                exact.partial, ClosureRepair::scaling);
-    summary.closure_error_max = report.error_before_max;
-    summary.closure_error_mean = report.error_before_rms;
-    summary.repair_max = report.change_max;
-    summary.closure_residual_max = report.error_after_max;
+    repair(result, whole, exact.partial, options.repair);
     for (Eigen::Index i : covered) result.area_m2[i] = result.exchange_area_m2.col(i).sum();
     summary.covered_patches = covered.size();
   }

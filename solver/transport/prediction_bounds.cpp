@@ -77,7 +77,8 @@ Eigen::VectorXd Prediction::solver_bounds() const {
     // Rows that miss more than kernels can lie partly under another surface: an error of the grid.
     constexpr double kKernelsAtMost = 1e-3;
     double row_error = fine().form_factors.closure_residual_max;
-    if (row_error > kKernelsAtMost) row_error = FormFactorOptions{}.relative_tolerance;
+    if (row_error > kKernelsAtMost && fine().form_factors.repair != ClosureRepair::none)
+      row_error = FormFactorOptions{}.relative_tolerance;
     for (Index k = 0; k < sum.size(); ++k) {
       double rho = 0.0;
       for (const Material& m : distinct_scene_.materials)
@@ -228,8 +229,7 @@ BandMatrix Prediction::surface_irradiance_bound() const {
   }
   const Eigen::VectorXd solver = solver_bounds();
   for (Index s = 0; s < surfaces; ++s)
-    if (area[s] > 0.0)
-      all.row(s) = expand(sum.row(s).transpose() / area[s] + solver).transpose();
+    if (area[s] > 0.0) all.row(s) = expand(sum.row(s).transpose() / area[s] + solver).transpose();
   return all;
 }
 

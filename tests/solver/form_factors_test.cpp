@@ -76,6 +76,23 @@ TEST(FormFactors, ClosedSceneWithABlockIsRepairedToUnity) {
   EXPECT_LT(f.summary.closure_residual_max, 1e-4);
 }
 
+TEST(FormFactors, LeastSquaresChangesLessThanScalingAndClosesAsWell) {
+  const Scene scene = tiny::cube_with_block(1.0, 0.5);
+  FormFactorOptions options = by_rays();
+  const FormFactors scaled = factors_of(scene, 0.2, options);
+  options.repair = ClosureRepair::least_squares;
+  const FormFactors changed = factors_of(scene, 0.2, options);
+  options.repair = ClosureRepair::none;
+  const FormFactors left = factors_of(scene, 0.2, options);
+  EXPECT_EQ(left.summary.repair_max, 0.0);
+  EXPECT_EQ(left.summary.closure_residual_max, left.summary.closure_error_max);
+  EXPECT_EQ(changed.summary.closure_error_max, left.summary.closure_error_max);
+  EXPECT_LT(changed.summary.closure_residual_max, 1e-4) << "as rows that are scaled";
+  // The sum of squared relative changes is what it minimises.
+  EXPECT_GT(changed.summary.repair_rms, 0.0);
+  EXPECT_LE(changed.summary.repair_rms, scaled.summary.repair_rms);
+}
+
 TEST(FormFactors, RepairTouchesSampledEntriesOnly) {
   const Scene scene = tiny::cube_with_block(1.0, 0.5);
   const PatchMesh mesh = uniform_mesh(scene, 0.2);
