@@ -35,7 +35,7 @@ std::vector<Polygon> cut(const Polygon& p) {
       return {first, second};
     }
   }
-  return CellTree::quarters(p, 1);
+  return CellTree::quarters(p);
 }
 
 }  // namespace
