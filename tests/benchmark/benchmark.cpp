@@ -304,7 +304,7 @@ int main(int argc, char** argv) {
     json["kernels"] = as_json(kernels);
   };
   if (only_kernels) {
-    kernels_of_all();
+    kernels_of(scene);
     return 0;
   }
   if (only_form_factors) {

@@ -95,9 +95,9 @@ inline void gather_truth(const Prediction& fine, std::vector<MeasuredPlace>& pla
       s.mesh.polygon_of(patch, polygon);
       const auto& rho = scene.material_of(surface).reflectance.values;
       const Eigen::Map<const Eigen::VectorXd> reflectance(rho.data(), value.size());
-      const auto add = [&](double factor, const Vec3& at, int) {
-        field.evaluate(j, at, value);
-        gather.add_direct(at, s.mesh.plane_of(patch).normal, value, source_scratch);
+      const auto add = [&](double factor, const Gather::Part& part) {
+        field.evaluate(j, part.centre, value);
+        gather.add_direct(part.centre, s.mesh.plane_of(patch).normal, value, source_scratch);
         place.indirect += factor * reflectance.cwiseProduct(value);
       };
       if (diameter_m(polygon) > kNearField * (patch.centroid - place.position_m).norm())
