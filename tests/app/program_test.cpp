@@ -488,21 +488,33 @@ TEST_F(Program, SolvesOnPolynomialsWithinBothBounds) {
     }
 }
 
+// A sheet between lamp and floor, and nothing around.
+constexpr char kBlockedRoom[] = R"(length_unit = "m"
+[bands]
+centres_nm = [550]
+[materials.lamp]
+reflectance = 0.2
+exitance = 1
+[materials.grey]
+reflectance = 0.5
+[[surfaces]]
+name = "low"
+material = "grey"
+vertices = [[0,0,0],[1,0,0],[1,1,0],[0,1,0]]
+[[surfaces]]
+name = "high"
+material = "lamp"
+vertices = [[0,0,1],[0,1,1],[1,1,1],[1,0,1]]
+[[surfaces]]
+name = "between"
+material = "grey"
+vertices = [[0.2,0.2,0.5],[0.7,0.2,0.5],[0.7,0.6,0.5],[0.2,0.6,0.5]]
+)";
+
 // Linear elements behind blocks agree with constant ones within both bounds.
 TEST_F(Program, SolvesWithPolynomialsWhereSurfacesHideEachOther) {
-  const std::string constant = scratch_path("hidden_constant.json"),
-                    linear = scratch_path("hidden_linear.json");
-  const std::string blocked = scratch_path("blocked.toml");
-  std::ofstream(blocked)
-      << "length_unit = \"m\"\n[bands]\ncentres_nm = [550]\n"
-         "[materials.lamp]\nreflectance = 0.2\nexitance = 1\n"
-         "[materials.grey]\nreflectance = 0.5\n"
-         "[[surfaces]]\nname = \"low\"\nmaterial = \"grey\"\n"
-         "vertices = [[0,0,0],[1,0,0],[1,1,0],[0,1,0]]\n"
-         "[[surfaces]]\nname = \"high\"\nmaterial = \"lamp\"\n"
-         "vertices = [[0,0,1],[0,1,1],[1,1,1],[1,0,1]]\n"
-         "[[surfaces]]\nname = \"between\"\nmaterial = \"grey\"\n"
-         "vertices = [[0.2,0.2,0.5],[0.7,0.2,0.5],[0.7,0.6,0.5],[0.2,0.6,0.5]]\n";
+  const std::string constant = file("constant.json"), linear = file("linear.json");
+  const std::string blocked = write("blocked.toml", kBlockedRoom);
   ASSERT_EQ(run("solve '" + blocked + "' --elements 600 -o '" + constant + "'").code, 0);
   ASSERT_EQ(run("solve '" + blocked + "' --basis linear -o '" + linear + "'").code, 0);
   const auto low = [](const std::string& path) {
@@ -514,6 +526,31 @@ TEST_F(Program, SolvesWithPolynomialsWhereSurfacesHideEachOther) {
   const auto [p, p_bound] = low(linear);
   EXPECT_NEAR(c, p, c_bound + p_bound);
   EXPECT_LT(p_bound, 0.05 * p);
+}
+
+TEST_F(Program, RepairsFactorsAsItIsTold) {
+  const std::string closed_box =
+      std::string(TRUEBOX_REFERENCE_DIR) + "/independent_renders/closed_box.toml";
+  const auto solved = [&](const std::string& repair) {
+    const Outcome outcome =
+        run("solve '" + closed_box + "' --elements 500 --form-factors " + "ray-casting --repair " +
+            repair + " -o '" + file("box.json") + "'");
+    EXPECT_EQ(outcome.code, 0) << outcome.text;
+    return nlohmann::json::parse(text_of(file("box.json")))["form_factors"];
+  };
+  const auto left = solved("none"), scaled = solved("scaling"), squares = solved("least-squares");
+  EXPECT_EQ(left["repair"], "none");
+  EXPECT_EQ(left["repair_max"], 0.0);
+  EXPECT_EQ(left["closure_residual_max"], left["closure_error_max"]);
+  for (const auto& repaired : {scaled, squares})
+    EXPECT_LT(repaired["closure_residual_max"].get<double>(),
+              0.1 * left["closure_residual_max"].get<double>());
+  EXPECT_LT(squares["repair_rms"].get<double>(), scaled["repair_rms"].get<double>());
+  const Outcome refused =
+      run("solve '" + closed_box + "' --form-factors streamed --repair none -o '" +
+          file("box.json") + "'");
+  EXPECT_EQ(refused.code, 4);
+  EXPECT_THAT(refused.text, HasSubstr("--repair"));
 }
 
 TEST_F(Program, RefusesWhatPolynomialsCannotDo) {
