@@ -5,6 +5,7 @@
 #include <ImfDeepFrameBuffer.h>
 #include <ImfDeepScanLineInputPart.h>
 #include <ImfHeader.h>
+#include <ImfMultiPartInputFile.h>
 #include <ImfPartType.h>
 
 #include <algorithm>
@@ -115,7 +116,8 @@ class DeepRow {
 }  // namespace
 
 std::vector<std::vector<float>> codecs::read_flattened(const std::filesystem::path& path,
-                                                       Imf::MultiPartInputFile& file, int index) {
+                                                       int index) {
+  Imf::MultiPartInputFile file(path.c_str());
   const Imf::Header& header = file.header(index);
   if (header.type() != Imf::DEEPSCANLINE)
     throw InputError(path.string(), 0, "deep images in scan lines", "deep tiles");

@@ -2,8 +2,6 @@
 // Parts of an OpenEXR file that hold many samples a pixel. Internal to this folder.
 #pragma once
 
-#include <ImfMultiPartInputFile.h>
-
 #include <filesystem>
 #include <vector>
 
@@ -17,7 +15,6 @@ namespace truebox::codecs {
 /// without samples are 0. One plane a channel, in the header's order. InputError for tiles, for
 /// samples without Z, and for volumes that overlap in depth. Source: Hillman (2012), The Theory of
 /// OpenEXR Deep Samples.
-std::vector<std::vector<float>> read_flattened(const std::filesystem::path& path,
-                                               Imf::MultiPartInputFile& file, int index);
+std::vector<std::vector<float>> read_flattened(const std::filesystem::path& path, int index);
 
 }  // namespace truebox::codecs

@@ -90,7 +90,7 @@ Image codecs::read_exr(const std::filesystem::path& path) try {
       return image.add_channel(p == 0 ? name : header.name() + "." + name);
     };
     if (is_deep(header)) {
-      auto planes = read_flattened(path, file, p);
+      auto planes = read_flattened(path, p);
       auto plane = planes.begin();
       for (auto it = header.channels().begin(); it != header.channels().end(); ++it)
         add_channel(it.name()).samples = std::move(*plane++);

@@ -28,12 +28,13 @@ struct Source {
 class NearSources {
  public:
   NearSources(const PatchMesh& mesh, const Scene& scene, const Gather& gather,
-              const std::vector<char>& usable, const BandMatrix& direct_share,
-              const BandMatrix& rest)
+              const std::vector<char>& usable, const Eigen::VectorXd& free_area_m2,
+              const BandMatrix& direct_share, const BandMatrix& rest)
       : mesh_(mesh),
         scene_(scene),
         gather_(gather),
         usable_(usable),
+        free_area_m2_(free_area_m2),
         direct_share_(direct_share),
         rest_(rest),
         culling_(mesh, scene, true) {
@@ -76,8 +77,8 @@ class NearSources {
           stack = culling_.blockers();
           const std::size_t to = stack.size();
           if (!culling_.keep_between(end_of(i), end_of(j), stack, 0, to)) continue;
-          correction.row(i) += received(i, j, sources[j], std::span(stack).subspan(to), scratch) /
-                               mesh_.patches[i].area_m2;
+          correction.row(i) +=
+              received(i, j, sources[j], std::span(stack).subspan(to), scratch) / free_area_m2_[i];
         }
     });
     return correction;
@@ -107,7 +108,7 @@ class NearSources {
         continue;
       for (std::uint32_t j = piece.first_patch; j < piece.first_patch + piece.patch_count; ++j) {
         const double reach = kNear * (radius_m_[i] + radius_m_[j]);
-        if (usable_[j] &&
+        if (usable_[j] && free_area_m2_[j] == mesh_.patches[j].area_m2 &&
             (mesh_.patches[j].centroid - patch.centroid).squaredNorm() < reach * reach)
           found.push_back(j);
       }
@@ -158,6 +159,7 @@ class NearSources {
   const Scene& scene_;
   const Gather& gather_;
   const std::vector<char>& usable_;
+  const Eigen::VectorXd& free_area_m2_;
   const BandMatrix& direct_share_;
   const BandMatrix& rest_;
   ShaftCulling culling_;
@@ -170,9 +172,10 @@ class NearSources {
 }  // namespace
 
 BandMatrix near_source_correction(const PatchMesh& mesh, const Scene& scene, const Gather& gather,
-                                  const std::vector<char>& usable, const BandMatrix& direct_share,
-                                  const BandMatrix& rest) {
-  return NearSources(mesh, scene, gather, usable, direct_share, rest).run();
+                                  const std::vector<char>& usable,
+                                  const Eigen::VectorXd& free_area_m2,
+                                  const BandMatrix& direct_share, const BandMatrix& rest) {
+  return NearSources(mesh, scene, gather, usable, free_area_m2, direct_share, rest).run();
 }
 
 }  // namespace truebox

@@ -120,8 +120,8 @@ std::unique_ptr<Prediction::Level> Prediction::solve_level(double edge_m, int sp
   };
   if (options.near_sources.value_or(false))
     task.near_sources = [&](const GridSolution& first) {
-      return near_source_correction(first.mesh, distinct_scene_, *level->gather, first.usable, rho,
-                                    rho.cwiseProduct(first.indirect));
+      return near_source_correction(first.mesh, distinct_scene_, *level->gather, first.usable,
+                                    first.free_area_m2, rho, rho.cwiseProduct(first.indirect));
     };
   if (options.solve_grid) {
     options.solve_grid(task, grid);
@@ -240,10 +240,11 @@ void Prediction::differentiate(const ExchangeOperator& exchange, const GridTask&
         if (is_in_material[i]) share.row(static_cast<Index>(i)).setOnes();
       const BandMatrix rest = derivative - share.cwiseProduct(grid.direct);
       BandMatrix more;
-      solve_radiosity(exchange, rho,
-                      rho.cwiseProduct(near_source_correction(grid.mesh, distinct_scene_, gather,
-                                                              grid.usable, share, rest)),
-                      quiet, more);
+      solve_radiosity(
+          exchange, rho,
+          rho.cwiseProduct(near_source_correction(grid.mesh, distinct_scene_, gather, grid.usable,
+                                                  grid.free_area_m2, share, rest)),
+          quiet, more);
       derivative += more;
     }
     Eigen::VectorXd area = Eigen::VectorXd::Zero(surfaces);

@@ -18,9 +18,11 @@ TEST(NearSources, LeaveAFurnaceAlone) {
   const PatchMesh mesh = uniform_mesh(scene, 0.25);
   const Gather gather(mesh, scene, true);
   const auto n = static_cast<Index>(mesh.size());
+  Eigen::VectorXd area_m2(n);
+  for (Index i = 0; i < n; ++i) area_m2[i] = mesh.patches[static_cast<std::size_t>(i)].area_m2;
   // Everything sends 2 wherever it is seen from: own exitance 1, half of an irradiance of 2.
   const BandMatrix missing =
-      near_source_correction(mesh, scene, gather, std::vector<char>(mesh.size(), 1),
+      near_source_correction(mesh, scene, gather, std::vector<char>(mesh.size(), 1), area_m2,
                              BandMatrix::Zero(n, 1), BandMatrix::Constant(n, 1, 2.0));
   EXPECT_LT(missing.cwiseAbs().maxCoeff(), 1e-12);
 }
