@@ -9,6 +9,7 @@ namespace {
 
 // Projections that run out to the horizon end where they are this much of the source's height.
 constexpr double kBelowSource = 1e-6;
+constexpr double kOnReceiver = 1e-12;  // of its radius: heights that are rounding
 
 bool same(const Vec3& a, const Vec3& b, double tolerance) { return (a - b).norm() <= tolerance; }
 
@@ -172,8 +173,19 @@ class EventFinder {
   // From the source's corner q, edge a-b casts its shadow on the receiver.
   void shadow_of_edge(const Vec3& q, Vec3 a, Vec3 b, bool of_two_edges) {
     const double hq = height(q), top = hq * (1.0 - kBelowSource);
+    if (hq <= kOnReceiver * receiver_.radius_m) shadow_along_receiver(q, a, b, of_two_edges);
     if (hq <= 0.0 || !keep_heights(a, b, 0.0, top)) return;
     events_.push_back({projected(q, hq, a), projected(q, hq, b), of_two_edges});
+  }
+
+  // A corner in the receiver's own plane, where a wall meets the floor: an edge that stands on the
+  // receiver casts its shadow from its foot straight away from there.
+  void shadow_along_receiver(const Vec3& q, const Vec3& a, const Vec3& b, bool of_two_edges) {
+    const Vec3& foot = height(a) < height(b) ? a : b;
+    const double away = (foot - q).norm();
+    if (height(foot) > kOnReceiver * receiver_.radius_m || away == 0.0) return;
+    const double across = 2.0 * receiver_.radius_m + (receiver_.centroid - foot).norm();
+    events_.push_back({foot, foot + across / away * (foot - q), of_two_edges});
   }
 
   // Edge q-r of the source as the receiver sees it behind the blocker's corner b.

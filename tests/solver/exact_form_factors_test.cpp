@@ -16,6 +16,7 @@
 #include "scene/scene_file.h"
 #include "support/brute_force_rows.h"
 #include "support/tiny_scenes.h"
+#include "transport/exact_visibility.h"
 #include "transport/pair_kernel.h"
 #include "transport/shadow_cones.h"
 #include "transport/shadow_lanes.h"
@@ -324,6 +325,48 @@ TEST(ShadowCones, AgreeWithExactPartsFarAway) {
     partly += exact > 0.01 && exact < 0.99;
   }
   EXPECT_GT(partly, 50);
+}
+
+// The tall block of the Cornell Box between floor and left wall, mm: corners of the wall lie in the
+// floor's plane and edges of the block stand on it. The shadow that such a corner casts along the
+// floor is a line that cells must not cross; where they did, 7e-7 went missing under a bound of
+// 1e-9.
+TEST(VisibleExchange, KeepsItsBoundWhereSourceAndBlockStandOnTheReceiver) {
+  const PlanarPolygon floor(Polygon{{552.8, 0, 0}, {0, 0, 0}, {0, 0, 559.2}, {549.6, 0, 559.2}});
+  const PlanarPolygon wall(Polygon{{552.8, 0, 0}, {549.6, 0, 559.2}, {556, 548.8, 0}});
+  const Vec3 foot[] = {{423, 0, 247}, {472, 0, 406}, {314, 0, 456}, {265, 0, 296}};
+  const Vec3 up(0, 330, 0);
+  std::vector<Blocker> faces;
+  const auto add = [&](const Polygon& p) { faces.push_back({p, plane_of(p)}); };
+  add({foot[0] + up, foot[3] + up, foot[2] + up, foot[1] + up});
+  for (int k = 0; k < 4; ++k) {
+    const Vec3 &a = foot[k], &b = foot[(k + 1) % 4];
+    add({a, a + up, b + up, b});
+  }
+  const auto solids = convex_occluders(faces, 1e-9);
+  ASSERT_EQ(solids.size(), 1u);
+  const ConvexOccluder* const solid[] = {&solids[0]};
+  std::vector<const Blocker*> polygons;
+  for (const Blocker& face : faces) polygons.push_back(&face);
+  const auto seen = [&](double tolerance) {
+    ExactVisibilityOptions options;
+    options.relative_tolerance = tolerance;
+    return *visible_exchange(floor, wall, solid, options);
+  };
+  const VisibleExchange fine = seen(1e-11);
+  ASSERT_TRUE(fine.converged);
+  ASSERT_GT(fine.exchange_area_m2, 0.05 * floor.area_m2);
+  for (double tolerance : {1e-5, 1e-6, 1e-7, 1e-8, 1e-9}) {
+    const VisibleExchange rough = seen(tolerance);
+    EXPECT_NEAR(rough.exchange_area_m2, fine.exchange_area_m2,
+                rough.error_bound_m2 + fine.error_bound_m2)
+        << tolerance;
+  }
+  ExactVisibilityOptions options;
+  options.relative_tolerance = 1e-8;
+  const VisibleExchange behind_faces = visible_exchange(floor, wall, polygons, options);
+  EXPECT_NEAR(behind_faces.exchange_area_m2, fine.exchange_area_m2,
+              behind_faces.error_bound_m2 + fine.error_bound_m2);
 }
 
 // Eight points of a square at the origin, looking up.
