@@ -40,6 +40,10 @@ void Planner::decide_mesh_unforetold() {
   add(std::move(d));
 }
 
+double Planner::elements_that_fit() const {
+  return std::floor(std::sqrt(static_cast<double>(request_.memory_limit_bytes) / sizeof(double)));
+}
+
 void Planner::adapt_if_it_pays(const Pilot& uniform, MeshChoice& choice) {
   if (choice.elements <= kAdaptingPaysFrom) {
     choice.why += "; an adapted mesh does not pay below " + count(kAdaptingPaysFrom) + " elements";
@@ -54,7 +58,9 @@ void Planner::adapt_if_it_pays(const Pilot& uniform, MeshChoice& choice) {
                 count(plan_.pilot->elements) + " elements, so " + count(adapted) +
                 " foretold and " + seconds(adapted_s) + " instead of " +
                 count(choice.uniform_elements) + " and " + seconds(uniform_s);
-  if (request_.goal || adapted_s < uniform_s) {
+  const bool alone_fits =
+      choice.uniform_elements > elements_that_fit() && adapted <= elements_that_fit();
+  if (request_.goal || adapted_s < uniform_s || alone_fits) {
     plan_.mesh = PlannedMesh::adapted;
     choice.elements = adapted;
   } else {
@@ -63,8 +69,7 @@ void Planner::adapt_if_it_pays(const Pilot& uniform, MeshChoice& choice) {
 }
 
 void Planner::fit_memory(const Pilot& uniform, MeshChoice& choice) {
-  const double fits =
-      std::floor(std::sqrt(static_cast<double>(request_.memory_limit_bytes) / sizeof(double)));
+  const double fits = elements_that_fit();
   const double streamed_s = kStreamedMatrices * uniform.processor_s_for(choice.uniform_elements);
   if (choice.elements > fits && streamed_s <= kStreamingPatience_s) {
     plan_.exchange = PlannedExchange::streamed;

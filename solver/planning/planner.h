@@ -46,7 +46,8 @@ class Planner {
   void decide_solver();
 
   std::size_t pieces() const;
-  double least_elements() const;  // that the bound means what it says
+  double elements_that_fit() const;  // as a matrix
+  double least_elements() const;     // that the bound means what it says
   static double pairs(double n) { return 0.5 * n * (n - 1.0); }
 
   const Scene& scene_;

@@ -225,6 +225,16 @@ TEST(Plan, StreamsRowsWhereAMatrixDoesNotFitAndTheyAreSoonMade) {
   EXPECT_EQ(decision(plan, "exchange").error_kind, ErrorKind::none);
 }
 
+// Cornell Box, uniform: 37,000 elements are foretold for 1 %, which take 10 GiB.
+TEST(Plan, AdaptsWhereAUniformMatrixDoesNotFitThoughItWereSooner) {
+  const Plan plan = make_plan(cornell_box(), target(0.01));
+  EXPECT_EQ(plan.mesh, PlannedMesh::adapted);
+  const double limit = std::sqrt(static_cast<double>(PlanRequest{}.memory_limit_bytes) / 8.0);
+  EXPECT_GT(decision(plan, "mesh").full_work, limit) << "nothing is left to choose";
+  EXPECT_LT(static_cast<double>(plan.elements), limit);
+  EXPECT_LE(decision(plan, "mesh").error, 0.01);
+}
+
 TEST(Plan, TakesLinksWhereOnlyTheyFit) {
   const Scene museum = [] {
     GeneratedSceneOptions options;
