@@ -281,10 +281,9 @@ void add_render_command(CLI::App& program, Action& chosen) {
   command->add_option("--filter", arguments->filter, "pixel filter: box or tent")
       ->capture_default_str()
       ->check(CLI::IsMember({"box", "tent"}));
-  command->add_flag(
-      "--gather-edges", arguments->prediction.gather_edges,
-      "radiosity: indirect light gathered in cells that get thinner towards edges, "
-      "where a field over elements misses some percent (several times the time)");
+  command->add_flag("--gather-edges", arguments->prediction.gather_edges,
+                    "radiosity: indirect light gathered in cells that get thinner towards edges, "
+                    "where a field over elements misses some percent (several times the time)");
   command
       ->add_option("--gather-above", arguments->gather_above_percent,
                    "radiosity: final gather in pixels whose bound exceeds this many % (slow)")
