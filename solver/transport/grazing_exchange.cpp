@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "transport/quadrature.h"
+#include "transport/polygon_rule.h"
 
 namespace truebox {
 namespace {
@@ -39,19 +39,14 @@ class Integrator {
   }
 
   double gauss(const Quad& q, int points) const {
-    const GaussRule& rule = gauss_rule(points);
-    const Vec3& normal = receiver_.plane.normal;
+    const Polygon cell(q.begin(), q.end());
+    const double area_m2 = area_vector(cell).norm();
+    if (area_m2 == 0.0) return 0.0;
     double sum = 0.0;
-    for (int j = 0; j < points; ++j)
-      for (int i = 0; i < points; ++i) {
-        const double u = rule.nodes[i], v = rule.nodes[j];
-        const Vec3 x = (1 - v) * ((1 - u) * q[0] + u * q[1]) + v * ((1 - u) * q[3] + u * q[2]);
-        const Vec3 du = (1 - v) * (q[1] - q[0]) + v * (q[2] - q[3]);
-        const Vec3 dv = (1 - u) * (q[3] - q[0]) + u * (q[2] - q[1]);
-        sum += rule.weights[i] * rule.weights[j] * normal.dot(du.cross(dv)) *
-               grazing_factor(x, normal, source_);
-      }
-    return sum;
+    for_each_gauss_point(cell, points, [&](const Vec3& x, double weight) {
+      sum += weight * grazing_factor(x, receiver_.plane.normal, source_);
+    });
+    return area_m2 * sum;
   }
 
   double integral(const Quad& q, int depth) const {
