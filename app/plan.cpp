@@ -24,6 +24,7 @@ namespace {
 struct PlanArguments {
   PredictionArguments wished;
   std::string json, camera, surface;
+  bool rms = false;
   double target_colour = 0.0;
   bool verify = false;
   std::size_t verify_elements = 600;
@@ -200,6 +201,7 @@ PredictionArguments wished_of(const PlanArguments& a) {
   PredictionArguments wished = a.wished;
   if (!a.camera.empty()) wished.automatic = "camera:" + a.camera;
   if (!a.surface.empty()) wished.automatic = "surface:" + a.surface;
+  if (a.rms) wished.automatic = "irradiance";
   return wished;
 }
 
@@ -263,8 +265,15 @@ void add_plan_command(CLI::App& program, Action& chosen) {
                    "dE00 that fewer bands may change a colour by: how many bands that takes")
       ->check(CLI::Range(0.01, 100.0));
   auto* camera = command->add_option("--camera", a->camera, "what counts is what this camera sees");
-  command->add_option("--surface", a->surface, "what counts is the mean of this surface")
-      ->excludes(camera);
+  auto* surface =
+      command->add_option("--surface", a->surface, "what counts is the mean of this surface")
+          ->excludes(camera);
+  command
+      ->add_flag("--rms", a->rms,
+                 "what counts is the rms error of irradiance over all surfaces, relative to its "
+                 "mean: foretold, not bound; solve --auto=irradiance does the same")
+      ->excludes(camera)
+      ->excludes(surface);
   command->add_flag("--interpolated", a->wished.interpolated,
                     "values are interpolated between corners, as viewers of .vtu and .glb do: "
                     "whether elements should follow lines of light");

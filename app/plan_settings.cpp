@@ -41,6 +41,8 @@ Plan plan_for(const Scene& scene, const PredictionArguments& wished) {
   request.camera = camera_of(scene, wished.automatic);
   if (!wished.automatic.empty() && wished.automatic != kDefaultGoal)
     request.goal = goal_of(scene, wished.automatic);
+  if (request.goal && request.goal->kind == Goal::Kind::irradiance)
+    request.measure = ErrorMeasure::rms_irradiance;
   return make_plan(scene, request);
 }
 
@@ -64,6 +66,8 @@ PredictionArguments applied(const Plan& plan, const PredictionArguments& wished)
     a.form_factors = plan.form_factors == FormFactorMethod::exact_visibility ? "exact-visibility"
                                                                              : "ray-casting";
   }
+  if (plan.measure == ErrorMeasure::rms_irradiance)
+    a.target_error.clear();  // that is a target of means; this one was foretold
   a.discontinuities = plan.discontinuities;
   if (plan.mesh == PlannedMesh::adapted)
     a.adaptive = wished.automatic.empty() ? kDefaultGoal : wished.automatic;

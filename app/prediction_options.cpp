@@ -148,7 +148,7 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
   auto* automatic = command.add_flag(
       std::string("--auto{") + kDefaultGoal + "}", a.automatic,
       "as truebox plan decides for --target-error (1%); =camera:NAME or =surface:NAME as for "
-      "--adaptive");
+      "--adaptive; =irradiance: the rms error of irradiance over all surfaces");
   for (const char* decided :
        {"--elements", "--rays", "--method", "--form-factors", "--link-tolerance", "--solver-bound",
         "--adaptive", "--discontinuities"})
@@ -230,8 +230,8 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
     return std::make_unique<Prediction>(predicted->scene, attempt);
   };
   if (!a.adaptive.empty()) {
-    if (a.solve_grid || options.find_exchange)
-      throw InputError("--adaptive", 0, "a matrix of form factors in one process",
+    if (a.solve_grid || a.form_factors == "streamed")
+      throw InputError("--adaptive", 0, "form factors that are kept, in one process",
                        a.solve_grid ? "--distributed" : "--form-factors " + a.form_factors);
     const Goal goal = goal_of(a, predicted->scene);
     solve = [&predicted, goal, &a](const PredictOptions& attempt) {

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "hierarchy/hierarchical_exchange.h"
 #include "radiometry/processor_time.h"
 #include "transport/closure_repair.h"
 #include "transport/direct_light.h"
@@ -22,6 +23,7 @@ using Eigen::Index;
 constexpr unsigned kRays = 16;
 constexpr double kKernelTolerance = 1e-5;
 constexpr double kRounding = 1e-12;
+constexpr double kLinksAtMost = 3.0;  // of their estimate, as in bounds
 
 struct Element {
   PlanarPolygon polygon;
@@ -168,6 +170,19 @@ double brightest_reflectance(const Scene& scene) {
   return rho;
 }
 
+// Root mean square over the area, relative to the mean; the worst band.
+double rms_difference(const Prediction& a, const Prediction& b) {
+  const BandMatrix of_a = a.irradiance(), of_b = b.irradiance();
+  const Eigen::VectorXd& area_m2 = b.fine().free_area_m2;
+  double worst = 0.0;
+  for (Index k = 0; k < of_b.cols(); ++k)
+    if (const double mean = area_m2.dot(of_b.col(k)) / area_m2.sum(); mean > 0.0)
+      worst = std::max(worst, std::sqrt(area_m2.dot((of_a.col(k) - of_b.col(k)).cwiseAbs2()) /
+                                        area_m2.sum()) /
+                                  mean);
+  return worst;
+}
+
 class Checks {
  public:
   Checks(const Scene& scene, const Plan& plan, std::size_t elements)
@@ -175,6 +190,32 @@ class Checks {
         mesh_(uniform_mesh(scene, edge_for_count(scene, elements))),
         needed_(needed_model(plan)),
         planned_(solve_model(scene, mesh_, needed_)) {}
+
+  // Irradiance by links against that of the matrix, rms over the area relative to the mean.
+  void hold_links(double tolerance) {
+    PredictOptions options;
+    options.mesh_of_grid = [this](int) { return mesh_; };
+    options.near_sources = false;
+    const auto solve = [&](double& processor_s) {
+      const double start = process_cpu_s();
+      auto prediction = std::make_unique<Prediction>(scene_, options);
+      processor_s = process_cpu_s() - start;
+      return prediction;
+    };
+    ClaimCheck check;
+    check.claim = "links instead of a matrix";
+    check.work = "numbers";
+    const auto matrix = solve(check.full_s);
+    options.find_exchange = hierarchical_exchange({.relative_tolerance = tolerance});
+    const auto links = solve(check.planned_s);
+    const auto n = static_cast<double>(mesh_.size());
+    check.full_work = 0.5 * n * n;
+    check.planned_work = static_cast<double>(links->fine().links->links);
+    check.difference = rms_difference(*links, *matrix);
+    check.allowed = kLinksAtMost * tolerance;
+    check.allowed_why = "three times the tolerance, which is an estimate";
+    checks_.push_back(std::move(check));
+  }
 
   // The planned answer against that of `model`, which makes one claim less.
   void hold(const std::string& claim, const Model& model, const char* work,
@@ -269,6 +310,7 @@ std::vector<ClaimCheck> check_claims(const Scene& scene, const Plan& plan, std::
     checks.hold("solver stops early", model, "passes", passes_of, plan.solver_bound + 1e-13,
                 "the solver's bound");
   }
+  if (plan.exchange == PlannedExchange::hierarchical) checks.hold_links(plan.link_tolerance);
   if (!plan.needs.occlusion) {
     const bool exact = !plan.needs.interreflection;
     checks.hold("all of it", full_model(), "rays", rays_of, exact ? kRounding : kernel + stop,

@@ -31,6 +31,7 @@ double facing_pairs(const Pilot& pilot) {
 
 Plan Planner::make() {
   plan_.needs = requirements(scene_);
+  plan_.measure = request_.measure;
   MutualVisibility visibility(scene_);
   plan_.sight = visibility.shares();
   if (visibility.is_complete()) plan_.visibility = std::move(visibility);
@@ -116,7 +117,7 @@ PredictOptions Planner::pilot_options() const {
 }
 
 void Planner::fly(const std::optional<Goal>& goal) {
-  plan_.pilot = fly_pilot(scene_, pilot_options(), goal);
+  plan_.pilot = fly_pilot(scene_, pilot_options(), goal, request_.measure);
 }
 
 void Planner::decide_method() {

@@ -12,9 +12,9 @@
 namespace truebox {
 
 struct PlanRequest {
-  /// Bound of every surface's mean irradiance, or standard error of a pixel where paths are traced;
-  /// a share.
+  /// A share: of what `measure` says, or standard error of a pixel where paths are traced.
   double target_error = 0.01;
+  ErrorMeasure measure = ErrorMeasure::bound_of_means;
   /// What counts: nothing for all surfaces alike, else what the mesh is refined for.
   std::optional<Goal> goal;
   std::optional<CameraDescription> camera;  ///< whose picture is wanted
@@ -61,6 +61,7 @@ struct Plan {
   std::optional<Pilot> pilot;                  ///< none for scenes too large for one
   std::optional<PathPilot> path_pilot;
 
+  ErrorMeasure measure = ErrorMeasure::bound_of_means;  ///< as requested
   PlannedMethod method = PlannedMethod::radiosity;
   PlannedMesh mesh = PlannedMesh::uniform;
   PlannedExchange exchange = PlannedExchange::full_matrix;
