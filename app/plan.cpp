@@ -17,6 +17,7 @@
 #include "planning/full_model.h"
 #include "radiometry/input_error.h"
 #include "scene/scene_file.h"
+#include "solve_basis.h"
 
 namespace truebox::app {
 namespace {
@@ -151,6 +152,7 @@ nlohmann::json plan_json(const Scene& scene, const Plan& plan, const std::string
                          {"path_tracing", plan.needs.path_tracing},
                          {"method", methods[static_cast<int>(plan.method)]},
                          {"exchange", exchanges[static_cast<int>(plan.exchange)]},
+                         {"basis", basis_names()[static_cast<std::size_t>(plan.degree)]},
                          {"elements", plan.elements},
                          {"adapted", plan.mesh == PlannedMesh::adapted},
                          {"discontinuities", plan.discontinuities},
@@ -202,6 +204,7 @@ PredictionArguments wished_of(const PlanArguments& a) {
   if (!a.camera.empty()) wished.automatic = "camera:" + a.camera;
   if (!a.surface.empty()) wished.automatic = "surface:" + a.surface;
   if (a.rms) wished.automatic = "irradiance";
+  wished.means_only = !a.rms && a.camera.empty() && !wished.interpolated;
   return wished;
 }
 

@@ -182,6 +182,7 @@ Progress terminal_progress(bool quiet) {
 std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
   auto predicted = std::make_unique<Predicted>();
   predicted->scene = read_scene_of(wished);
+  predicted->plan = wished.as_planned;
   const PredictionArguments a =
       wished.automatic.empty() ? wished : planned(predicted->scene, wished, predicted->plan);
   std::unique_ptr<tbb::global_control> limit;

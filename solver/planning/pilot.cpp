@@ -102,11 +102,10 @@ Pilot fly_pilot(const Scene& scene, const PredictOptions& options,
   return pilot;
 }
 
-Pilot fly_single_pilot(const Scene& scene, const PredictOptions& options,
-                       const std::optional<Goal>& adapted_to) {
+Pilot fly_single_pilot(const Scene& scene, const PredictOptions& options) {
   Pilot pilot;
   pilot.elements =
-      timed_solve(scene, options, adapted_to, pilot.processor_s)->fine().mesh.size();
+      timed_solve(scene, options, std::nullopt, pilot.processor_s)->fine().mesh.size();
   return pilot;
 }
 

@@ -44,8 +44,7 @@ Pilot fly_pilot(const Scene& scene, const PredictOptions& options,
                 ErrorMeasure measure = ErrorMeasure::bound_of_means);
 
 /// Elements and processor time alone, from one solve: `cost_exponent` and errors are not found.
-Pilot fly_single_pilot(const Scene& scene, const PredictOptions& options,
-                       const std::optional<Goal>& adapted_to);
+Pilot fly_single_pilot(const Scene& scene, const PredictOptions& options);
 
 /// The same for path tracing: the relative standard error of a pixel, median of a small picture.
 struct PathPilot {

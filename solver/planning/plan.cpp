@@ -32,6 +32,7 @@ double facing_pairs(const Pilot& pilot) {
 Plan Planner::make() {
   plan_.needs = requirements(scene_);
   plan_.measure = request_.measure;
+  plan_.target_error = request_.target_error;
   MutualVisibility visibility(scene_);
   plan_.sight = visibility.shares();
   if (visibility.is_complete()) plan_.visibility = std::move(visibility);
@@ -89,10 +90,12 @@ void Planner::plan_radiosity() {
   plan_.form_factors = FormFactorMethod::exact_visibility;
   if (kGridsOfAPiece * pieces() <= kLargestPilot) fly(std::nullopt);
   decide_method();
-  decide_mesh();
-  decide_lines();
-  decide_basis();
-  decide_exchange();
+  if (!choose_polynomials()) {
+    decide_mesh();
+    decide_lines();
+    decide_basis();
+    decide_exchange();
+  }
   const Pilot* pilot = plan_.pilot ? &*plan_.pilot : nullptr;
   decide_occlusion(pilot ? static_cast<double>(pilot->form_factors.pairs_sampled) : 0.0,
                    pilot ? facing_pairs(*pilot) : 0.0);

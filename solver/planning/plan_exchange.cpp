@@ -2,7 +2,6 @@
 // What is kept between elements.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "hierarchy/hierarchical_exchange.h"
 #include "planning/plan_text.h"
@@ -72,7 +71,7 @@ void Planner::exchange_by_links(double matrix_bytes, Decision& d) {
     d.why = links_why_;
   }
   HierarchyOptions options{plan_.link_tolerance, request_.memory_limit_bytes};
-  if (estimated_bytes(plan_.elements, options) > request_.memory_limit_bytes)  // not of a choice
+  if (estimated_bytes(plan_.elements, options) > request_.memory_limit_bytes)
     plan_.link_tolerance = options.relative_tolerance = kCoarseLinks;
   plan_.bytes = estimated_bytes(plan_.elements, options);
   d.choice = "hierarchical, links of " + percent(plan_.link_tolerance) + ", about " +
@@ -84,45 +83,49 @@ void Planner::exchange_by_links(double matrix_bytes, Decision& d) {
   d.error_of = "irradiance, rms over the area";
 }
 
-// At equal error of the whole answer. Links may be as wrong as asked for: what they leave out is
-// then somewhat less than the error of their elements, of which there are a few more than a matrix
-// would need, and the two are independent.
+// At equal error of the whole answer, on uniform elements: where a search for the mesh comes first,
+// links save little of the whole. Links may be as wrong as asked for: what they leave out is then
+// somewhat less than the error of their elements, of which there are a few more than a matrix would
+// need, and the two are independent.
 bool Planner::link_if_it_pays(const Pilot& uniform, MeshChoice& choice) {
-  if (choice.elements < kLinksPayFrom) {
+  if (choice.uniform_elements < kLinksPayFrom) {
     links_why_ = "; links take longer below some " + count(kLinksPayFrom) + " elements";
     return false;
   }
   const double target = request_.target_error;
-  const bool is_adapted = plan_.mesh == PlannedMesh::adapted;
-  const double linked = std::max(plan_.pilot->elements_for(kMeshShare * target), least_elements());
+  const double linked = std::max(uniform.elements_for(kMeshShare * target), least_elements());
   const HierarchyOptions hierarchy{target, request_.memory_limit_bytes};
   if (estimated_bytes(static_cast<std::size_t>(std::min(linked, 1e9)), hierarchy) >
-      hierarchy.memory_limit_bytes)
+      hierarchy.memory_limit_bytes) {
+    links_why_ = "; links of " + percent(target) + " may not fit";
     return false;
+  }
   PredictOptions options = pilot_options();
   options.elements = std::max<std::size_t>(kLinkPilotElements, options.elements);
   options.find_exchange = hierarchical_exchange(hierarchy);
-  const auto goal = is_adapted ? std::optional<Goal>(*request_.goal) : std::nullopt;
-  const Pilot links = fly_single_pilot(scene_, options, goal);
+  const Pilot links = fly_single_pilot(scene_, options);
   const double links_s =
       links.processor_s * std::pow(linked / static_cast<double>(links.elements), kLinksByElements);
-  const bool fits = choice.elements <= elements_that_fit();
-  const double matrix_s = (is_adapted ? *plan_.pilot : uniform).processor_s_for(choice.elements);
   // Where the two laws meet: links of a mesh's own error grow with the tolerance as well.
-  const double power = plan_.pilot->cost_exponent - kLinksByElements -
-                       kLinksByTolerance * plan_.pilot->error_order;
-  const double meet = power > 0.0 ? choice.elements * std::pow(links_s / matrix_s, 1.0 / power)
-                                  : std::numeric_limits<double>::infinity();
-  const std::string both = count(linked) + " elements with links of " + percent(target) + " take " +
-                           seconds(links_s) + ", a matrix of " + count(choice.elements) +
-                           " for the same error " + seconds(matrix_s);
-  if (fits && links_s >= matrix_s) {
-    links_why_ = "; " + both;
+  const double uniform_s = uniform.processor_s_for(choice.uniform_elements);
+  const double power =
+      uniform.cost_exponent - kLinksByElements - kLinksByTolerance * uniform.error_order;
+  const double meet = choice.uniform_elements * std::pow(links_s / uniform_s, 1.0 / power);
+  std::string why = count(linked) + " even elements with links of " + percent(target) + " take " +
+                    seconds(links_s) + ", a matrix of " + count(choice.uniform_elements) +
+                    " for the same error " + seconds(uniform_s) + ": links are sooner from " +
+                    count(std::max(kLinksPayFrom, meet)) + " elements of such a matrix on";
+  const bool is_adapted = plan_.mesh == PlannedMesh::adapted;
+  const double matrix_s = plan_.pilot->processor_s_for(choice.elements);
+  if (is_adapted) why += "; a matrix of adapted elements takes " + seconds(matrix_s);
+  if (choice.elements <= elements_that_fit() && links_s >= matrix_s) {
+    links_why_ = "; " + why;
     return false;
   }
-  links_why_ = both + (fits ? "" : ", and does not fit") + "; links are sooner from " +
-               count(std::max(kLinksPayFrom, meet)) + " elements of a matrix on";
+  links_why_ = why;
   plan_.exchange = PlannedExchange::hierarchical;
+  plan_.mesh = PlannedMesh::uniform;
+  plan_.pilot = uniform;
   plan_.link_tolerance = target;
   plan_.processor_s = links_s;
   choice.elements = linked;

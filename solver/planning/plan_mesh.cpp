@@ -117,7 +117,7 @@ void Planner::decide_mesh() {
 // assumed, because few elements have no room for many lines.
 void Planner::decide_lines() {
   if (!plan_.needs.occlusion) return;
-  Decision d{"lines of light", "not followed", ""};
+  Decision d{"lines of light", "not followed"};
   d.left_out = "elements along outlines of shadows (--discontinuities)";
   d.error_of = "irradiance interpolated between corners, rms over the area";
   if (!request_.interpolated) {
@@ -149,21 +149,6 @@ void Planner::decide_lines() {
   d.error = plan_.discontinuities ? pilot.error_along : pilot.error;
   d.error_of = "direct light interpolated between corners, rms over the area, with " +
                count(pilot.elements) + " elements";
-  add(std::move(d));
-}
-
-// Measured orders: tests/verification/basis_convergence_test.cpp.
-void Planner::decide_basis() {
-  Decision d{"basis", "constants, and a continuous field of quadratics between them", ""};
-  d.why = plan_.needs.occlusion
-              ? "light has kinks at shadows, where a higher degree gains nothing on elements that "
-                "do not follow them"
-              : "edges where surfaces meet leave every degree of first order on even elements; "
-                "means, which are bound here, converge twice as fast";
-  d.left_out = "polynomials of degree 1 to 4 (solve --basis, where nothing is hidden)";
-  d.error_kind = ErrorKind::bound;
-  d.error = plan_.pilot ? mesh_error_ : std::numeric_limits<double>::quiet_NaN();
-  d.error_of = "mean irradiance of a surface, together with the mesh";
   add(std::move(d));
 }
 

@@ -35,6 +35,19 @@ class Planner {
   void adapt_if_it_pays(const Pilot& uniform, MeshChoice& choice);
   void fit_memory(const Pilot& uniform, MeshChoice& choice);
   void decide_lines();
+
+  // What the radiosity is on an element: plan_basis.cpp.
+  struct PolynomialChoice {
+    int degree = 0;
+    std::size_t pilot_elements = 0;
+    double pilot_bound = 0.0;
+    double elements = 0.0, unknowns = 0.0, processor_s = 0.0;  // foretold
+  };
+  std::string why_no_polynomials() const;
+  std::optional<PolynomialChoice> fly_polynomials(double patience_s) const;
+  bool choose_polynomials();
+  void plan_polynomials(const PolynomialChoice& choice, double constants, const std::string& name,
+                        const std::string& why);
   void decide_basis();
 
   // What is kept between them: plan_exchange.cpp.
@@ -62,7 +75,7 @@ class Planner {
   const PlanRequest& request_;
   Plan plan_;
   double mesh_error_ = 0.0;
-  std::string links_why_;
+  std::string links_why_, basis_why_;
 };
 
 }  // namespace truebox

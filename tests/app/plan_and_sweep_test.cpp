@@ -17,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
+using testing::Not;
 
 CommandOutcome run(const std::string& arguments, const std::string& environment = "") {
   return run_command(environment +
@@ -103,6 +104,29 @@ TEST(PlanProgram, SolvesAsPlannedByOneWordAndByThePrintedLine) {
   EXPECT_EQ(first.at("surfaces"), second.at("surfaces"));
   EXPECT_LE(first.at("largest_relative_bound_of_a_surface").get<double>(), 0.03);
   EXPECT_EQ(run("solve " + scene + " --auto --elements 100").code, 64);
+}
+
+// Constants would take more elements than fit.
+TEST(PlanProgram, TakesPolynomialsForMeansAndConstantsForFilesOfAllElements) {
+  const std::string scene = room("polynomial.toml"), a = scratch_path("polynomial.json"),
+                    b = scratch_path("polynomial_typed.json");
+  const std::string wished = "solve " + scene + " --auto --target-error 0.02% -o " + a;
+  const CommandOutcome automatic = run(wished);
+  EXPECT_EQ(automatic.code, 0) << automatic.text;
+  EXPECT_THAT(automatic.text, HasSubstr("as planned: truebox solve"));
+  EXPECT_THAT(automatic.text, HasSubstr("--basis "));
+  const std::size_t at = automatic.text.find("truebox solve") + 8;
+  const std::string line = automatic.text.substr(at, automatic.text.find('\n', at) - at);
+  ASSERT_EQ(run(line + " -o " + b).code, 0) << line;
+  const json first = json::parse(text_of(a)), second = json::parse(text_of(b));
+  EXPECT_EQ(first.at("surfaces"), second.at("surfaces"));
+  EXPECT_LE(first.at("largest_relative_bound_of_a_surface").get<double>(), 2e-4);
+  EXPECT_EQ(first.at("surfaces")[0].at("irradiance").size(), 3u);
+  const CommandOutcome elements =
+      run("solve " + scene + " --auto --target-error 5% -o " + scratch_path("polynomial.vtu"));
+  EXPECT_EQ(elements.code, 0) << elements.text;
+  EXPECT_THAT(elements.text, Not(HasSubstr("--basis")));
+  EXPECT_EQ(run("solve " + scene + " --auto --basis linear").code, 64);
 }
 
 // The cube with two walls of chart colours under daylight, in 31 bands.

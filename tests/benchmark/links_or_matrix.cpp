@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <functional>
+#include <limits>
 #include <string>
 
 #include "adaptive/adaptive_solution.h"
@@ -22,6 +23,7 @@ namespace truebox::benchmark {
 namespace {
 
 constexpr std::size_t kLargestMatrix = 11000;
+constexpr int kRepetitions = 3;  // what else runs takes from the caches: the least time counts
 constexpr double kTruthEdge_m = 0.14;
 
 struct Cost {
@@ -65,10 +67,16 @@ PredictOptions on_one_mesh(const Scene& scene, std::size_t elements) {
 
 Cost measure(const std::vector<MeasuredPlace>& places, double tolerance,
              const std::function<std::unique_ptr<Prediction>()>& predict) {
-  const double start_s = process_cpu_s();
-  const auto prediction = predict();
+  std::unique_ptr<Prediction> prediction;
+  double least_s = std::numeric_limits<double>::infinity();
+  for (int repetition = 0; repetition < kRepetitions; ++repetition) {
+    prediction.reset();
+    const double start_s = process_cpu_s();
+    prediction = predict();
+    least_s = std::min(least_s, process_cpu_s() - start_s);
+  }
   const Prediction& p = *prediction;
-  Cost cost{p.fine().mesh.size(), tolerance, process_cpu_s() - start_s};
+  Cost cost{p.fine().mesh.size(), tolerance, least_s};
   cost.error = field_error(p, places).to_mean;
   const auto& links = p.fine().links;
   cost.bytes = links ? links->bytes : cost.elements * cost.elements * sizeof(double);
