@@ -31,6 +31,7 @@ struct PlanArguments {
   std::size_t verify_elements = 600;
 };
 
+constexpr double kNoSaving = 1.001;
 constexpr std::size_t kSurfacesShown = 24;
 
 const char* text_of(ErrorKind kind) {
@@ -50,12 +51,11 @@ std::string error_text(const Decision& d) {
 }
 
 std::string work_text(const Decision& d) {
-  if (d.work.empty()) return {};
+  if (d.work.empty() || d.saving() <= kNoSaving) return {};
   const double saving = d.saving();
-  return fmt::format("{:.3g} {} instead of {:.3g}{}", d.planned_work, d.work, d.full_work,
-                     std::isinf(saving) ? ": none left"
-                     : saving > 1.001   ? fmt::format(": {:.3g} times less", saving)
-                                        : std::string());
+  return fmt::format(
+      "{:.3g} {} instead of {:.3g}: {}", d.planned_work, d.work, d.full_work,
+      std::isinf(saving) ? "none left" : fmt::format("{:.3g} times less", saving));
 }
 
 std::string decisions_text(const Plan& plan) {
@@ -100,6 +100,7 @@ std::string colour_text(const std::vector<BandChoice>& choices, const BandChoice
 }
 
 std::string claims_text(const std::vector<ClaimCheck>& claims) {
+  if (claims.empty()) return "held to the full model: nothing is left out of it\n";
   std::string text =
       fmt::format("held to the full model\n  {:<28}{:>11}{:>11}  {:<14}{:>12}{:>12}{:>12}\n",
                   "claim", "planned", "full", "work", "time x", "difference", "allowed");
@@ -189,14 +190,16 @@ nlohmann::json claims_json(const std::vector<ClaimCheck>& claims) {
 }
 
 std::string expected_text(const Plan& plan) {
-  std::string text = "expected          ";
+  std::string text;
   if (plan.processor_s > 0.0)
-    text +=
-        fmt::format("{:.2g} s of processor time (within a factor of three), ", plan.processor_s);
-  return text + fmt::format("{} MiB of {}\n", plan.bytes >> 20,
-                            plan.exchange == PlannedExchange::hierarchical ? "links and elements"
-                            : plan.exchange == PlannedExchange::streamed   ? "radiosity"
-                                                                           : "form factors");
+    text = fmt::format("{:.2g} s of processor time (within a factor of three)", plan.processor_s);
+  if (plan.bytes > 0)
+    text += fmt::format("{}{:.2g} MiB of {}", text.empty() ? "" : ", ",
+                        static_cast<double>(plan.bytes) / (1 << 20),
+                        plan.exchange == PlannedExchange::hierarchical ? "links and elements"
+                        : plan.exchange == PlannedExchange::streamed   ? "radiosity"
+                                                                       : "form factors");
+  return text.empty() ? text : "expected          " + text + "\n";
 }
 
 PredictionArguments wished_of(const PlanArguments& a) {

@@ -248,7 +248,10 @@ class Checks {
   // Irradiance by links against that of the matrix, rms over the area relative to the mean.
   void hold_links(double tolerance) {
     PredictOptions options;
-    options.mesh_of_grid = [this](int) { return mesh_; };
+    // The finest grid alone counts.
+    options.mesh_of_grid = [this](int grid) {
+      return grid < 2 ? uniform_mesh(scene_, scene_.diameter_m()) : mesh_;
+    };
     options.near_sources = false;
     const auto solve = [&](double& processor_s) {
       const double start = process_cpu_s();

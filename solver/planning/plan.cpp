@@ -50,7 +50,8 @@ void Planner::plan_paths() {
   plan_.method = PlannedMethod::path_tracing;
   plan_.exchange = PlannedExchange::none;
   plan_.bands_solved = scene_.bands.size();
-  Decision d{"method", "path tracing", plan_.needs.reasons.front()};
+  const std::string& reason = plan_.needs.reasons.front();  // "path tracing: needed, surface ..."
+  Decision d{"method", "path tracing", reason.substr(reason.find(", ") + 2)};
   d.left_out = "nothing; form factors cannot describe such a surface";
   d.error_kind = ErrorKind::noise;
   d.error = request_.target_error;

@@ -117,7 +117,9 @@ void Planner::decide_mesh() {
 // assumed, because few elements have no room for many lines.
 void Planner::decide_lines() {
   if (!plan_.needs.occlusion) return;
-  Decision d{"lines of light", "not followed"};
+  Decision d;
+  d.topic = "lines of light";
+  d.choice = "not followed";
   d.left_out = "elements along outlines of shadows (--discontinuities)";
   d.error_of = "irradiance interpolated between corners, rms over the area";
   if (!request_.interpolated) {
