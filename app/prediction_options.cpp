@@ -169,12 +169,16 @@ const CameraDescription& find_camera(const Scene& scene, const std::string& name
 
 Progress terminal_progress(bool quiet) {
   if (quiet || !::isatty(STDERR_FILENO)) return {};
-  auto last = std::make_shared<int>(-1);
+  auto last = std::make_shared<std::pair<std::string, int>>("", -1);
   return [last](const std::string& stage, double share) {
-    const int percent = static_cast<int>(100.0 * share);
-    if (percent == *last) return;
-    *last = percent;
-    fmt::print(stderr, "\r{:<24}{:3d} %{}", stage, percent, percent == 100 ? "\r\033[K" : "");
+    const std::pair<std::string, int> now(stage, static_cast<int>(100.0 * share));
+    if (now == *last) return;
+    *last = now;
+    // The rest of the line may be that of a longer stage.
+    if (now.second == 100)
+      fmt::print(stderr, "\r\033[K");
+    else
+      fmt::print(stderr, "\r{:<24} {:3d} %\033[K", stage, now.second);
     std::fflush(stderr);
   };
 }

@@ -112,8 +112,10 @@ TargetedMeans polynomial_means_to_target(const Scene& scene, PolynomialOptions o
     if (result.is_reached) return result;
     const double wanted =
         kReserve * std::pow(bound / relative_error, 1.0 / bound_order(options.degree));
-    options.elements = static_cast<std::size_t>(static_cast<double>(result.means.elements) *
-                                                std::clamp(wanted, kSmallestStep, kLargestStep));
+    // Requests near each other may give the same mesh: what was asked for grows with what came.
+    options.elements = static_cast<std::size_t>(
+        static_cast<double>(std::max(options.elements, result.means.elements)) *
+        std::clamp(wanted, kSmallestStep, kLargestStep));
   }
 }
 

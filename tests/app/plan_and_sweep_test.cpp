@@ -189,11 +189,30 @@ TEST(SweepProgram, SweepsEveryMethodAgainstTracedPathsAndReports) {
     methods.insert(point.at("method").get<std::string>());
     front |= point.at("on_front").get<bool>();
   }
-  EXPECT_EQ(methods.size(), 6u);
+  EXPECT_EQ(methods.size(), 5u);
   EXPECT_TRUE(front);
+  EXPECT_THAT(sweep.at("left_out").dump(), HasSubstr("by rays: nothing can stand between"));
+  EXPECT_THAT(swept.text, HasSubstr("left out: a matrix by rays"));
   EXPECT_THAT(sweep.at("reference").get<std::string>(), HasSubstr("path tracing"));
   EXPECT_GT(sweep.at("reference_error").get<double>(), 0.0);
   EXPECT_THAT(text_of(folder + "/report.html"), HasSubstr("Pareto front"));
+}
+
+// Who takes longer must gain one percent that the reference can tell.
+TEST(SweepProgram, PutsNobodyOnTheFrontForAGainThatIsNone) {
+  const std::string scene = room("front.toml", 0.7), folder = scratch_path("front");
+  ASSERT_EQ(run(small_sweep(scene, folder)).code, 0);
+  const json sweep = json::parse(text_of(folder + "/sweep.json"));
+  const double resolved = sweep.at("errors_told_apart_above");
+  EXPECT_GT(resolved, sweep.at("reference_error").get<double>());
+  const auto& points = sweep.at("points");
+  for (const json& p : points)
+    for (const json& q : points)
+      if (p.at("on_front") && q.at("on_front") && p.at("cpu_s") < q.at("cpu_s")) {
+        EXPECT_GT(0.99 * p.at("error").get<double>(),
+                  std::max(resolved, q.at("error").get<double>()) * (1.0 - 1e-12))
+            << q;
+      }
 }
 
 TEST(SweepProgram, GoesOnWhereItWasStopped) {
@@ -240,6 +259,7 @@ TEST(SweepProgram, OfAMirrorTracesPathsAgainstManyMore) {
   ASSERT_EQ(swept.code, 0) << swept.text;
   const json sweep = json::parse(text_of(folder + "/sweep.json"));
   for (const json& point : sweep.at("points")) EXPECT_EQ(point.at("method"), "paths");
+  EXPECT_THAT(sweep.at("left_out").dump(), HasSubstr("not Lambertian"));
   EXPECT_THAT(sweep.at("reference").get<std::string>(), HasSubstr("1024 paths"));
 }
 
