@@ -209,5 +209,45 @@ TEST_F(ReducedBasis, TakesBandsThatHaveNothingInCommon) {
         << k;
 }
 
+// Residuals of 1e-13 of the radiosity, where rounding begins.
+TEST_F(ReducedBasis, TakesABandThatIsNearlyWhite) {
+  rho_.col(9).setConstant(0.999999);
+  BandMatrix b;
+  const SolveSummary summary = solve_radiosity(f_, rho_, source_, {}, b);
+  ASSERT_EQ(summary.outcome, SolveOutcome::converged) << summary.brief();
+  const BandMatrix truth = direct_solution(f_, rho_, source_);
+  for (Index k = 0; k < kBands; ++k)
+    // LU loses cond = 1e6 times 2e-16.
+    EXPECT_LE((b.col(k) - truth.col(k)).cwiseAbs().maxCoeff(),
+              summary.error_bound[k] + 1e-9 * truth.col(k).maxCoeff())
+        << k;
+}
+
+TEST_F(ReducedBasis, KnowsNoUnitOfLength) {
+  mesh(0.125);
+  BandMatrix metres, other;
+  const SolveSummary first = solve_radiosity(f_, rho_, source_, {}, metres);
+  for (const double metres_each : {1e-6, 1e6}) {
+    FormFactors scaled = f_;
+    scaled.area_m2 *= metres_each * metres_each;
+    scaled.exchange_area_m2 *= metres_each * metres_each;
+    const SolveSummary summary = solve_radiosity(scaled, rho_, source_, {}, other);
+    EXPECT_EQ(summary.outcome, SolveOutcome::converged);
+    EXPECT_NEAR(summary.matrix_passes, first.matrix_passes, 0.1 * first.matrix_passes);
+    for (Index k = 0; k < kBands; ++k)
+      EXPECT_LE((other.col(k) - metres.col(k)).cwiseAbs().maxCoeff(),
+                first.error_bound[k] + summary.error_bound[k]);
+  }
+}
+
+TEST_F(ReducedBasis, HasNothingToDoWithoutLight) {
+  source_.setZero();
+  BandMatrix b;
+  const SolveSummary summary = solve_radiosity(f_, rho_, source_, {}, b);
+  EXPECT_EQ(summary.outcome, SolveOutcome::converged);
+  EXPECT_EQ(summary.matrix_passes, 0.0);
+  EXPECT_EQ(b.cwiseAbs().maxCoeff(), 0.0);
+}
+
 }  // namespace
 }  // namespace truebox
