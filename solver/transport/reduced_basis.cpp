@@ -19,7 +19,6 @@ constexpr Index kFewestBands = 12;  // below, plain iterations read the matrix a
 // Parts of the worst residual, and of what is allowed, that no functions are made for: the next
 // ones change what is that small anyway.
 constexpr double kNext = 0.03, kEnd = 0.5;
-constexpr Index kMostShare = 2;     // half the elements: more functions cost more than steps
 constexpr int kMostIdleRounds = 3;  // without a tenth less: rounding is reached
 
 class ReducedBasis {
@@ -33,6 +32,13 @@ class ReducedBasis {
       if (!(s_.contraction(k) < 1.0)) return false;  // no residual would do
     groups_ = reflectance_groups(s_.exchange.area_m2(), s_.rho, s_.source);
     return !groups_.empty();
+  }
+
+  // Factors of so many, in all bands, take no more memory than a matrix of the elements, where that
+  // is a burden at all.
+  Index most_functions() const {
+    const auto as_large = static_cast<Index>(static_cast<double>(n_) / std::sqrt(m_));
+    return std::min<Index>(n_, std::clamp<Index>(as_large, 256, 1024));
   }
 
   // False if other methods must go on from here.
@@ -111,7 +117,7 @@ class ReducedBasis {
       columns += static_cast<double>(added.cols() * group.size()) / static_cast<double>(n_);
       blocks.push_back({group.elements(), std::move(added)});
     }
-    if (blocks.empty() || size > n_ / kMostShare) return false;
+    if (blocks.empty() || size > most_functions()) return false;
     s_.summary.matrix_passes += columns / static_cast<double>(m_);
     most_added_ = std::max(most_added_, size - old);
     s_.summary.bands_reduced = static_cast<int>(std::max<Index>(0, m_ - most_added_));
