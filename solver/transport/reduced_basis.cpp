@@ -38,7 +38,7 @@ class ReducedBasis {
   // is a burden at all.
   Index most_functions() const {
     const auto as_large = static_cast<Index>(static_cast<double>(n_) / std::sqrt(m_));
-    return std::min<Index>(n_, std::clamp<Index>(as_large, 256, 1024));
+    return std::min<Index>(n_, std::clamp<Index>(as_large, 384, 1024));
   }
 
   // False if other methods must go on from here.
