@@ -18,7 +18,7 @@ using Eigen::Index;
 constexpr Index kFewestBands = 12;  // below, plain iterations read the matrix as seldom
 // Parts of the worst residual, and of what is allowed, that no functions are made for: the next
 // ones change what is that small anyway.
-constexpr double kNext = 0.03, kEnd = 0.1;
+constexpr double kNext = 0.03, kEnd = 0.25;
 constexpr int kMostIdleRounds = 3;  // without a tenth less: rounding is reached
 
 class ReducedBasis {
