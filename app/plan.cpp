@@ -53,9 +53,8 @@ std::string error_text(const Decision& d) {
 std::string work_text(const Decision& d) {
   if (d.work.empty() || d.saving() <= kNoSaving) return {};
   const double saving = d.saving();
-  return fmt::format(
-      "{:.3g} {} instead of {:.3g}: {}", d.planned_work, d.work, d.full_work,
-      std::isinf(saving) ? "none left" : fmt::format("{:.3g} times less", saving));
+  return fmt::format("{:.3g} {} instead of {:.3g}: {}", d.planned_work, d.work, d.full_work,
+                     std::isinf(saving) ? "none left" : fmt::format("{:.3g} times less", saving));
 }
 
 std::string decisions_text(const Plan& plan) {

@@ -32,8 +32,9 @@ std::vector<Style> styles_of(const LinePlot& plot) {
   std::size_t solid = 0, dashed = 0;
   for (const PlotSeries& s : plot.series) {
     if (s.dashed) {
-      styles.push_back({"currentColor", fmt::format(" stroke-opacity=\"0.75\" stroke-dasharray=\"{}\"",
-                                                    kDashes[dashed++ % kDashes.size()])});
+      styles.push_back(
+          {"currentColor", fmt::format(" stroke-opacity=\"0.75\" stroke-dasharray=\"{}\"",
+                                       kDashes[dashed++ % kDashes.size()])});
     } else {
       const std::size_t i = solid++ % kColours.size();
       styles.push_back({fmt::format("var(--series-{},{})", i, kColours[i]), ""});
@@ -121,8 +122,8 @@ std::string line(const PlotSeries& s, const Style& style, const AxisScale& x, co
   }
   if (path.empty()) return "";
   return fmt::format(
-      "<path fill=\"none\" stroke-width=\"2\" stroke-linejoin=\"round\"{} d=\"{}\"/>",
-      style.dash, path);
+      "<path fill=\"none\" stroke-width=\"2\" stroke-linejoin=\"round\"{} d=\"{}\"/>", style.dash,
+      path);
 }
 
 std::string bars(const PlotSeries& s, std::size_t i, const AxisScale& x, const AxisScale& y) {
@@ -193,7 +194,8 @@ std::string to_svg(const LinePlot& plot) {
       "font-size=\"14\" fill=\"currentColor\"><title>{}</title>",
       kWidth, kLegendTop + rows * kLegendRow - 8, xml_escape(plot.title));
   svg += axes(plot, x, y);
-  for (std::size_t i = 0; i < plot.series.size(); ++i) svg += draw(plot.series[i], i, styles[i], x, y);
+  for (std::size_t i = 0; i < plot.series.size(); ++i)
+    svg += draw(plot.series[i], i, styles[i], x, y);
   return svg + legend_svg + "</svg>";
 }
 

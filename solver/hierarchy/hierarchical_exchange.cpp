@@ -234,9 +234,8 @@ std::string HierarchyOptions::invalid() const {
 }
 
 std::size_t estimated_bytes(std::size_t elements, const HierarchyOptions& options) {
-  const double links =
-      std::min(0.5 * static_cast<double>(elements),
-               kLinksOfAnElement * 1e-2 / options.relative_tolerance);
+  const double links = std::min(0.5 * static_cast<double>(elements),
+                                kLinksOfAnElement * 1e-2 / options.relative_tolerance);
   return static_cast<std::size_t>(static_cast<double>(elements) *
                                   (kBytesOfAnElement + links * kBytesOfALink * kCopies));
 }

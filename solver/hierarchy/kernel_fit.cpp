@@ -62,7 +62,8 @@ Points points_of(const GroupFrame& frame, const Vec3& normal, const Vec3& origin
   return points;
 }
 
-TRUEBOX_MANY_TARGETS void project(const Points& a, const Points& b, const Rule& r, float (*coefficient)[kN]) {
+TRUEBOX_MANY_TARGETS void project(const Points& a, const Points& b, const Rule& r,
+                                  float (*coefficient)[kN]) {
   float half[kN][kN] = {};  // points of a x terms of b
   for (int i = 0; i < kN; ++i) {
     float kernel[kN];

@@ -214,8 +214,8 @@ class LinkRefinement::Walk {
     std::uint32_t cuts = 0;
     for (std::uint32_t solid : between_) {
       ShadowCone& cone = cones_[count];
-      const auto hides = ShadowCone::make(x, normal, parent_.solids_[solid],
-                                          parent_.culling_.tolerance_m(), cone);
+      const auto hides =
+          ShadowCone::make(x, normal, parent_.solids_[solid], parent_.culling_.tolerance_m(), cone);
       if (hides == ShadowCone::Hides::nothing) continue;
       if (hides == ShadowCone::Hides::all) return 0.0;
       if (cone.count == 0) return share_past_polygons(x, normal, source);
@@ -250,10 +250,9 @@ class LinkRefinement::Walk {
     const Vec3 &normal = node(receiver).normal, &at = node(receiver).centre;
     const double reach = kFarForCentroids * std::max(radius_m, source.radius_m);
     const double horizon = normal.dot(at) + parent_.culling_.tolerance_m();
-    const bool near =
-        (source.centroid - at).squaredNorm() < reach * reach ||
-        std::any_of(source.vertices.begin(), source.vertices.end(),
-                    [&](const Vec3& v) { return normal.dot(v) <= horizon; });
+    const bool near = (source.centroid - at).squaredNorm() < reach * reach ||
+                      std::any_of(source.vertices.begin(), source.vertices.end(),
+                                  [&](const Vec3& v) { return normal.dot(v) <= horizon; });
     double seen = 0.0, all = 0.0, squares = 0.0;
     find_points(receiver);
     for (const WeightedPoint& x : points_) {

@@ -45,8 +45,7 @@ template <int Width>
     } else {
       double sum[Width] = {};
       for (int m = 0; m < n; ++m)
-        for (int b = 0; b < Width; ++b)
-          sum[b] += static_cast<double>(row[m]) * in[m * Width + b];
+        for (int b = 0; b < Width; ++b) sum[b] += static_cast<double>(row[m]) * in[m * Width + b];
       for (int b = 0; b < Width; ++b) out[k * Width + b] += sum[b];
     }
   }

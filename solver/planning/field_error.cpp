@@ -31,8 +31,7 @@ void visit_places(const GridSolution& grid, const Visit& visit) {
     grid.mesh.polygon_of(patch, polygon);
     for (std::uint64_t k = 0; k < kPlacesOfAnElement; ++k) {
       const std::uint64_t seed = hash(kPlacesOfAnElement * i + k);
-      visit(patch.piece,
-            sample_polygon(polygon, unit_interval(seed), unit_interval(hash(seed))),
+      visit(patch.piece, sample_polygon(polygon, unit_interval(seed), unit_interval(hash(seed))),
             patch.area_m2 / static_cast<double>(kPlacesOfAnElement));
     }
   }
@@ -53,8 +52,7 @@ Eigen::VectorXd squared_difference(const Field& fine, const Field& coarse) {
 }  // namespace
 
 double field_error(const Prediction& prediction) {
-  const Field fine(prediction.fine()), coarse(prediction.coarse()),
-      coarsest(prediction.coarsest());
+  const Field fine(prediction.fine()), coarse(prediction.coarse()), coarsest(prediction.coarsest());
   const GridSolution& grid = fine.grid;
   const Eigen::VectorXd last = squared_difference(fine, coarse),
                         before = squared_difference(coarse, coarsest);

@@ -176,8 +176,8 @@ double brightest_reflectance(const Scene& scene) {
 BandMatrix means_of_surfaces(const Prediction& prediction) {
   const GridSolution& grid = prediction.fine();
   const BandMatrix irradiance = prediction.irradiance();
-  BandMatrix sum = BandMatrix::Zero(static_cast<Index>(prediction.scene().surfaces.size()),
-                                    irradiance.cols());
+  BandMatrix sum =
+      BandMatrix::Zero(static_cast<Index>(prediction.scene().surfaces.size()), irradiance.cols());
   Eigen::VectorXd area_m2 = Eigen::VectorXd::Zero(sum.rows());
   for (std::size_t i = 0; i < grid.mesh.size(); ++i) {
     const auto s = static_cast<Index>(grid.mesh.surface_of(grid.mesh.patches[i]));
@@ -195,9 +195,9 @@ double rms_difference(const Prediction& a, const Prediction& b) {
   double worst = 0.0;
   for (Index k = 0; k < of_b.cols(); ++k)
     if (const double mean = area_m2.dot(of_b.col(k)) / area_m2.sum(); mean > 0.0)
-      worst = std::max(worst, std::sqrt(area_m2.dot((of_a.col(k) - of_b.col(k)).cwiseAbs2()) /
-                                        area_m2.sum()) /
-                                  mean);
+      worst = std::max(
+          worst,
+          std::sqrt(area_m2.dot((of_a.col(k) - of_b.col(k)).cwiseAbs2()) / area_m2.sum()) / mean);
   return worst;
 }
 

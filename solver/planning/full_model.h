@@ -42,7 +42,7 @@ struct ClaimCheck {
   /// Largest of an element and band, relative to that band's largest; of links rms over the area,
   /// relative to the mean.
   double difference = 0.0;
-  double allowed = 0.0;     ///< what the plan says it can cause, at most
+  double allowed = 0.0;  ///< what the plan says it can cause, at most
   std::string allowed_why;
 
   bool holds() const { return difference <= allowed; }

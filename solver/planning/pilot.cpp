@@ -19,7 +19,7 @@ constexpr double kBoundOrder = 3.0 / 4;  // the bound falls like elements^-this
 // And the rms error of the field: measured, solver/README.md.
 constexpr double kFieldOrder = 0.6, kAdaptedFieldOrder = 1.0;
 constexpr double kLeastCostExponent = 1.6;  // measured from 2400 to 10,000 elements
-constexpr double kSmaller = 1.0 / 3.0;   // of the solve that the cost's growth is taken from
+constexpr double kSmaller = 1.0 / 3.0;      // of the solve that the cost's growth is taken from
 
 // How much of the light comes by reflection, in the band where that is most.
 double indirect_share(const Prediction& prediction) {
@@ -104,8 +104,7 @@ Pilot fly_pilot(const Scene& scene, const PredictOptions& options,
 
 Pilot fly_single_pilot(const Scene& scene, const PredictOptions& options) {
   Pilot pilot;
-  pilot.elements =
-      timed_solve(scene, options, std::nullopt, pilot.processor_s)->fine().mesh.size();
+  pilot.elements = timed_solve(scene, options, std::nullopt, pilot.processor_s)->fine().mesh.size();
   return pilot;
 }
 

@@ -12,19 +12,20 @@ namespace truebox {
 /// What a requested error is an error of.
 enum class ErrorMeasure {
   bound_of_means,  ///< largest bound of a surface's mean irradiance, as a share of that mean
-  rms_irradiance   ///< of the field, over the area of all surfaces, as a share of the mean: estimated
+  rms_irradiance   ///< of the field, over the area of all surfaces, as a share of the mean:
+                   ///< estimated
 };
 
 /// A small solve that foretells a large one: what it found and what it cost.
 struct Pilot {
   std::size_t elements = 0;
   ErrorMeasure measure = ErrorMeasure::bound_of_means;
-  double relative_bound = 0.0;     ///< bound_of_means
-  double field_error = 0.0;        ///< rms_irradiance
-  double error_order = 0.75;       ///< the measured error falls like elements^-this
-  double processor_s = 0.0;        ///< all threads, three grids
-  double cost_exponent = 2.0;      ///< processor time ~ elements^this, from a still smaller solve
-  double indirect_share = 0.0;     ///< of all irradiance, area-weighted, worst band
+  double relative_bound = 0.0;  ///< bound_of_means
+  double field_error = 0.0;     ///< rms_irradiance
+  double error_order = 0.75;    ///< the measured error falls like elements^-this
+  double processor_s = 0.0;     ///< all threads, three grids
+  double cost_exponent = 2.0;   ///< processor time ~ elements^this, from a still smaller solve
+  double indirect_share = 0.0;  ///< of all irradiance, area-weighted, worst band
   FormFactorSummary form_factors;
   double matrix_passes = 0.0;
   int bands_reduced = 0;  ///< found on the basis of the others

@@ -36,7 +36,8 @@ bool has_black_surface(const Scene& scene) {
 
 std::string Planner::why_no_polynomials() const {
   if (plan_.needs.occlusion)
-    return "light has kinks at shadows, where a higher degree gains nothing on elements that do not "
+    return "light has kinks at shadows, where a higher degree gains nothing on elements that do "
+           "not "
            "follow them";
   if (!request_.means_only || is_rms())
     return "values at points are wanted, and polynomials (solve --basis) give means of surfaces";
@@ -67,8 +68,8 @@ std::optional<Planner::PolynomialChoice> Planner::fly_polynomials(double patienc
     choice.pilot_bound = bound;
     // What met the target will meet it again.
     const bool is_met = bound <= request_.target_error;
-    choice.elements = is_met ? static_cast<double>(kPilotElements)
-                             : growth * static_cast<double>(pilot.elements);
+    choice.elements =
+        is_met ? static_cast<double>(kPilotElements) : growth * static_cast<double>(pilot.elements);
     choice.unknowns = growth * static_cast<double>(pilot.unknowns);
     choice.processor_s = pilot_s * std::pow(growth, kCostExponent);
     if (8.0 * choice.unknowns * choice.unknowns <=
@@ -91,14 +92,14 @@ bool Planner::choose_polynomials() {
                                    seconds(constants_s) + (fits ? "" : ", and do not fit");
   basis_why_ = of_constants + ": there is little to gain";
   if (fits && constants_s < kNothingToGain_s) return false;
-  const auto best =
-      fly_polynomials(fits ? constants_s : std::numeric_limits<double>::infinity());
+  const auto best = fly_polynomials(fits ? constants_s : std::numeric_limits<double>::infinity());
   if (!best) return false;
   const std::string name = kDegreeNames[best->degree];
-  const std::string why = name + " polynomials on " + count(best->pilot_elements) +
-                          " elements bind means to " + percent(best->pilot_bound) + ", so " +
-                          count(std::max(best->elements, static_cast<double>(best->pilot_elements))) +
-                          " foretold and " + seconds(best->processor_s) + "; " + of_constants;
+  const std::string why =
+      name + " polynomials on " + count(best->pilot_elements) + " elements bind means to " +
+      percent(best->pilot_bound) + ", so " +
+      count(std::max(best->elements, static_cast<double>(best->pilot_elements))) +
+      " foretold and " + seconds(best->processor_s) + "; " + of_constants;
   basis_why_ = why;
   if (fits && best->processor_s >= constants_s) return false;
   plan_polynomials(*best, constants, name, why);

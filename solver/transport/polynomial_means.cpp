@@ -50,16 +50,16 @@ PolynomialMeans polynomial_means(const Scene& scene, const PolynomialOptions& op
   const Requirements needs = requirements(scene);
   const Scene distinct = in_bands(scene, needs.distinct_bands);
   const double edge_m = edge_for_count(distinct, options.elements);
-  const PatchMesh mesh = options.degree > 1 ? graded_mesh(distinct, edge_m, kGrading)
-                                            : uniform_mesh(distinct, edge_m);
+  const PatchMesh mesh =
+      options.degree > 1 ? graded_mesh(distinct, edge_m, kGrading) : uniform_mesh(distinct, edge_m);
   GalerkinOptions galerkin;
   galerkin.degree = options.degree;
   galerkin.relative_tolerance = options.kernel_tolerance;
   galerkin.memory_limit_bytes = options.memory_limit_bytes;
   const GalerkinSystem system(mesh, distinct, galerkin);
-  const BandMatrix rho = of_surfaces(
-      distinct,
-      [](const Material& m) -> const std::vector<double>& { return m.reflectance.values; });
+  const BandMatrix rho = of_surfaces(distinct, [](const Material& m) -> const std::vector<double>& {
+    return m.reflectance.values;
+  });
   const BandMatrix exitance = of_surfaces(
       distinct, [](const Material& m) -> const std::vector<double>& { return m.exitance.values; });
   PolynomialMeans result;

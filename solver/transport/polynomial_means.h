@@ -17,8 +17,8 @@ struct PolynomialOptions {
   std::size_t memory_limit_bytes = std::size_t{8} << 30;
 };
 
-/// Means of the surfaces by polynomials on elements (GalerkinSystem), which are graded towards edges
-/// from degree 2 on; surfaces x bands, W m^-2 nm^-1. Openings have zeros.
+/// Means of the surfaces by polynomials on elements (GalerkinSystem), which are graded towards
+/// edges from degree 2 on; surfaces x bands, W m^-2 nm^-1. Openings have zeros.
 struct PolynomialMeans {
   int degree = 0;
   std::size_t elements = 0;

@@ -251,8 +251,8 @@ PlanRequest rms_target(double error) {
   return request;
 }
 
-// Uniform elements: from a matrix of some 4000 on (tests/benchmark/links_or_matrix.cpp). Adapted ones
-// with a matrix may still be sooner than both; on a busy machine, too.
+// Uniform elements: from a matrix of some 4000 on (tests/benchmark/links_or_matrix.cpp). Adapted
+// ones with a matrix may still be sooner than both; on a busy machine, too.
 TEST(Plan, OfRmsIrradianceTakesLinksOrAdaptsWhereAUniformMatrixTakesLonger) {
   const Scene box = in_bands_at(closed_box(), {550.0});
   const Plan coarse = make_plan(box, rms_target(0.02));
