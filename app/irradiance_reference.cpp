@@ -14,6 +14,7 @@
 #include "path_tracer/path_scene.h"
 #include "path_tracer/path_tracer.h"
 #include "radiometry/input_error.h"
+#include "radiometry/processor_time.h"
 #include "radiometry/table_file.h"
 #include "sensor/camera.h"
 #include "transport/enclosure.h"
@@ -159,18 +160,28 @@ IrradianceTable trace_irradiance(const Scene& scene, const std::vector<ProbePoin
 
 IrradianceTable trace_reference(const Scene& scene, const std::vector<ProbePoint>& places,
                                 double relative_error, int least_paths, int most_paths,
-                                std::uint64_t seed, const Progress& progress) {
+                                double patience_s, std::uint64_t seed, const Progress& progress) {
+  const double start_s = process_cpu_s();
+  bool is_stopped = false;
   int paths = least_paths;
   IrradianceTable table = trace_irradiance(scene, places, paths, seed);
   while (table.relative_error() > relative_error && paths < most_paths) {
+    // The next round takes as long as all so far.
+    is_stopped = 2.0 * (process_cpu_s() - start_s) > patience_s;
+    if (is_stopped) break;
     const double done = relative_error / table.relative_error();
     if (progress) progress("reference", std::min(0.99, done * done));
     table = joined(table, trace_irradiance(scene, places, paths, ++seed));
     paths *= 2;
   }
   if (progress) progress("reference", 1.0);
-  table.source = fmt::format("path tracing, {} paths a place, standard error {:.2g} % rms", paths,
-                             100.0 * table.relative_error());
+  table.source =
+      fmt::format("path tracing, {} paths a place, standard error {:.2g} % rms{}", paths,
+                  100.0 * table.relative_error(),
+                  is_stopped ? fmt::format(" (stopped: {:.2g} % would take more than {:.0f} "
+                                           "s of processor time, --reference-time)",
+                                           100.0 * relative_error, patience_s)
+                             : "");
   return table;
 }
 

@@ -34,10 +34,11 @@ IrradianceTable trace_irradiance(const Scene& scene, const std::vector<ProbePoin
                                  int paths, std::uint64_t seed, const Progress& progress = {});
 
 /// Doubles the paths from `least_paths` a place on until `relative_error` is reached, or
-/// `most_paths`.
+/// `most_paths`, or the next round would end beyond `patience_s` of processor time: the source says
+/// so, and how good the table is then.
 IrradianceTable trace_reference(const Scene& scene, const std::vector<ProbePoint>& places,
                                 double relative_error, int least_paths, int most_paths,
-                                std::uint64_t seed, const Progress& progress);
+                                double patience_s, std::uint64_t seed, const Progress& progress);
 
 /// CSV with name,band_nm,irradiance,standard_error of every place in every band of the scene (rows
 /// of other bands are left alone). InputError names what is missing.

@@ -31,9 +31,9 @@ constexpr Subject kSubjects[] = {{"irradiance", sweep_irradiance},
 std::string settings_of(const SweepArguments& a) {
   return fmt::format(
       "from \"{}\" to \"{}\", {:g} s a point, points \"{}\", reference \"{}\", camera \"{}\", {} "
-      "places, reference to {}, up to {} elements and {} paths",
+      "places, reference to {} in {:g} s, up to {} elements and {} paths",
       a.from, a.to, a.time_limit_s, a.points, a.reference, a.camera, a.places, a.reference_error,
-      a.largest_elements, a.largest_paths);
+      a.reference_time_s, a.largest_elements, a.largest_paths);
 }
 
 LedgerHeader header_of(const Scene& scene, const SweepArguments& a, const SweepSubject& subject) {
@@ -132,6 +132,13 @@ void add_sweep_command(CLI::App& program, Action& chosen) {
                    "standard error, rms, to trace that reference to")
       ->capture_default_str()
       ->check(check_share)
+      ->excludes(reference);
+  command
+      ->add_option("--reference-time", a->reference_time_s,
+                   "s of processor time that tracing it may take: what it reached by then is its "
+                   "error")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 1e6))
       ->excludes(reference);
   command->add_option("--save-reference", a->save_reference, "write the reference as such a CSV");
   command->add_option("--largest-elements", a->largest_elements, "finest grid of irradiance")

@@ -45,6 +45,7 @@ struct SweepArguments {
   std::string save_reference;
   std::size_t places = 32;               ///< of irradiance, where no points are given
   std::string reference_error = "0.3%";  ///< standard error that the reference is traced to
+  double reference_time_s = 60.0;        ///< of processor time, that the reference may take
   std::size_t largest_elements = 4000;
   int largest_paths = 4096;
   JobShare share;

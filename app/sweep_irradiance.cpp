@@ -104,7 +104,7 @@ class IrradianceSweep : public SweepSubject {
       reference_ = trace_reference(
           scene_, places_, *share_of(arguments_.reference_error),
           is_lambertian_ ? kLeastReferencePaths : kReferenceAhead * arguments_.largest_paths,
-          kMostReferencePaths, kReferenceSeed, progress);
+          kMostReferencePaths, arguments_.reference_time_s, kReferenceSeed, progress);
     if (!arguments_.save_reference.empty())
       write_file_atomically(arguments_.save_reference, irradiance_csv(reference_, places_, scene_));
     if (!(reference_.value.array() > 0.0).any())

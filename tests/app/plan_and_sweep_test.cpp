@@ -263,6 +263,18 @@ TEST(SweepProgram, OfAMirrorTracesPathsAgainstManyMore) {
   EXPECT_THAT(sweep.at("reference").get<std::string>(), HasSubstr("1024 paths"));
 }
 
+TEST(SweepProgram, StopsAReferenceThatTakesTooLongAndSaysHowGoodItIs) {
+  const std::string folder = scratch_path("impatient");
+  const CommandOutcome swept = run("sweep " + room("impatient.toml", 0.7) +
+                                   " --places 2 --largest-elements 250 --largest-paths 16 --quiet "
+                                   "--reference-error 0.001% --reference-time 0.1 -o " +
+                                   folder);
+  ASSERT_EQ(swept.code, 0) << swept.text;
+  const json sweep = json::parse(text_of(folder + "/sweep.json"));
+  EXPECT_THAT(sweep.at("reference").get<std::string>(), HasSubstr("stopped: 0.001 %"));
+  EXPECT_GT(sweep.at("reference_error").get<double>(), 1e-5);
+}
+
 TEST(SweepProgram, RefusesAReferenceThatLacksAPlace) {
   const std::string scene = room("referred.toml");
   const std::string points = write(

@@ -283,7 +283,7 @@ TEST(Plan, HoldsLinksToTheMatrixOfTheSameElements) {
   Plan plan;
   plan.needs = requirements(box);
   plan.exchange = PlannedExchange::hierarchical;
-  plan.link_tolerance = 0.01;
+  plan.link_tolerance = 0.003;
   const auto claims = check_claims(box, plan, 500);
   const ClaimCheck& links = claim_of(claims, "links instead of a matrix");
   EXPECT_TRUE(links.holds()) << links.difference << " > " << links.allowed;
