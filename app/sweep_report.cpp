@@ -183,7 +183,10 @@ Report report_of(const Sweep& sweep,
   report.key_numbers = {{"smallest error", 100.0 * best.error, "%", 2, best.method},
                         {"reference's own error", 100.0 * sweep.floor, "%", 2, "k = 1"},
                         {"settings", static_cast<double>(sweep.points.size()), "1",
-                         sweep.points.size() < 100 ? 2 : 3, ""}};
+                         sweep.points.size() < 10    ? 1
+                         : sweep.points.size() < 100 ? 2
+                                                     : 3,
+                         ""}};
   Section trade{"Error against time", {}};
   trade.blocks.push_back(Figure{
       "Error against processor time", as_svg(sweep),
