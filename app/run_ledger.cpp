@@ -73,7 +73,8 @@ void require_same_run(const std::filesystem::path& path, const LedgerHeader& exp
   for (const auto& [name, value] : expected.inputs) {
     const auto other = found.inputs.find(name);
     const std::string there = other == found.inputs.end() ? "(none)" : other->second;
-    if (there != value) differs(path, name, value, there + "; it has changed since");
+    if (there != value)
+      differs(path, name, value, there + "; it has changed since, --restart begins anew");
   }
   if (found.inputs.size() != expected.inputs.size())
     differs(path, "as many inputs as", std::to_string(expected.inputs.size()),
