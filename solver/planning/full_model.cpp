@@ -358,7 +358,7 @@ std::vector<ClaimCheck> check_claims(const Scene& scene, const Plan& plan, std::
   } else if (plan.bands_solved < plan.needs.distinct_bands.size()) {
     Model model = checks.needed();
     model.share_bands = false;
-    checks.hold("bands on the basis of others", model, "bands", bands_of, stop,
+    checks.hold("bands in one space of functions", model, "bands", bands_of, stop,
                 "both solvers' bounds");
   }
   if (plan.needs.interreflection) {

@@ -14,7 +14,7 @@ struct Model {
   bool every_pair = true;       ///< rays for all pairs that face each other, clear or not
   bool interreflection = true;  ///< false: direct light only
   bool every_band = true;       ///< false: bands that are multiples of others are scaled
-  bool share_bands = false;     ///< bands on the basis of others
+  bool share_bands = false;     ///< all bands in one space of functions
   double solver_bound = 1e-12;  ///< relative
 };
 

@@ -28,7 +28,7 @@ struct Pilot {
   double indirect_share = 0.0;  ///< of all irradiance, area-weighted, worst band
   FormFactorSummary form_factors;
   double matrix_passes = 0.0;
-  int bands_reduced = 0;  ///< found on the basis of the others
+  int bands_reduced = 0;  ///< bands less the most products of a pass
 
   double error() const;  ///< by the measure
   /// Elements that meet an error by the order that it is observed to fall with.

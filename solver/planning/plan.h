@@ -74,7 +74,7 @@ struct Plan {
   double solver_bound = 1e-7;
   double link_tolerance = 0.0;   ///< hierarchical
   int paths = 0;                 ///< a pixel
-  std::size_t bands_solved = 0;  ///< by themselves, not from products of others
+  std::size_t bands_solved = 0;  ///< products of a pass, where that is fewer than bands
   double processor_s = 0.0;      ///< estimate, to a factor of three; 0: unknown
   std::size_t bytes = 0;         ///< of form factors or links
 

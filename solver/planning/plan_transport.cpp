@@ -71,20 +71,22 @@ void Planner::decide_form_factors() {
 void Planner::decide_bands(int reduced, double solver_bound) {
   const std::size_t all = scene_.bands.size(), distinct = plan_.needs.distinct_bands.size();
   plan_.bands_solved = distinct - static_cast<std::size_t>(reduced);
-  Decision d{"bands", count(plan_.bands_solved) + " of " + count(all) + " solved by themselves",
+  Decision d{"bands",
+             count(distinct) + " of " + count(all) +
+                 (reduced > 0 ? " solved, in one space of functions" : " solved"),
              ""};
   d.why = distinct == all ? "no two are multiples of each other"
                           : count(all - distinct) + " are exact multiples of others";
   if (distinct < all) d.left_out = "bands that are multiples of others";
   if (reduced > 0) {
-    d.why += "; spectra are alike, so " + count(static_cast<std::size_t>(reduced)) +
-             " are found from products of the others, each held to its own residual";
-    d.left_out += std::string(d.left_out.empty() ? "" : ", and ") + "passes of their own";
+    d.why += "; spectra are alike, so that at most " + count(plan_.bands_solved) +
+             " products a pass serve all, each held to its own residual";
+    d.left_out += std::string(d.left_out.empty() ? "" : ", and ") + "products of every band";
     d.error_kind = ErrorKind::bound;
     d.error = solver_bound;
   }
   d.error_of = "radiosity";
-  d.work = "bands by themselves";
+  d.work = reduced > 0 ? "products a pass" : "bands";
   d.planned_work = static_cast<double>(plan_.bands_solved);
   d.full_work = static_cast<double>(all);
   add(std::move(d));
@@ -92,7 +94,10 @@ void Planner::decide_bands(int reduced, double solver_bound) {
 
 void Planner::decide_solver() {
   if (plan_.degree > 0) plan_.solver_bound = GalerkinOptions{}.relative_bound;
-  Decision d{"solver", "conjugate gradients to a bound of " + percent(plan_.solver_bound),
+  const bool shared = plan_.bands_solved < plan_.needs.distinct_bands.size();
+  Decision d{"solver",
+             std::string(shared ? "one space of functions" : "conjugate gradients") +
+                 ", to a bound of " + percent(plan_.solver_bound),
              "a thousandth of the target costs a few passes more than none"};
   d.left_out = "a factorisation";
   if (plan_.degree > 0) d.why = "it costs next to nothing beside the moments";

@@ -84,8 +84,8 @@ std::string SolveSummary::brief() const {
                      std::to_string(iterations) + " iterations, " + passes +
                      " passes over the form factors";
   if (bands_reduced > 0)
-    text += "; " + std::to_string(bands_reduced) + " of " + std::to_string(error_bound.size()) +
-            " bands from products of the others";
+    text += "; at most " + std::to_string(error_bound.size() - bands_reduced) +
+            " products a pass for all " + std::to_string(error_bound.size()) + " bands";
   return text;
 }
 

@@ -33,8 +33,8 @@ struct SolveOptions {
   double relative_bound =
       1e-7;  ///< stop when the bound is below this share of max |B| in each band
   int iteration_limit = 10000;
-  /// Conjugate gradients: products of a few bands serve them all, where spectra are smooth. The
-  /// bound is the same.
+  /// Instead of conjugate gradients one space of functions for all bands (see reduced_basis.h),
+  /// from twelve bands on. The bound is the same.
   bool share_bands = true;
   /// Told the radiosity (elements x bands) and the work so far, in passes over S; may be empty.
   std::function<void(double matrix_passes, const BandMatrix& radiosity)> on_progress;
