@@ -123,8 +123,9 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       ->check(CLI::Range(1e-13, 0.5));
   command
       .add_option("--target-error", a.target_error,
-                  "choose elements and solver bound so that each surface's mean is bound to this "
-                  "share (\"0.5%\" or 0.005)")
+                  "choose elements and solver bound so that the error bound of what is asked for is "
+                  "this share (\"0.5%\" or 0.005) of its irradiance or less: of each place of probe, "
+                  "else of each surface's mean; in every band")
       ->check(check_share);
   command.add_flag(std::string("--adaptive{") + kDefaultGoal + "}", a.adaptive,
                    "refine where the error comes from instead of everywhere; =everywhere, "
@@ -207,6 +208,11 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
   options.watch_finest = a.watch_finest;
   options.form_factors.memory_limit_bytes = a.memory_MiB << 20;
   if (a.form_factors == "hierarchical") {
+    if (!a.target_error.empty())
+      throw InputError("--target-error", 0,
+                       "form factors with a bound (exact-visibility or streamed): links have an "
+                       "estimate",
+                       "--form-factors hierarchical");
     const HierarchyOptions hierarchy{a.link_tolerance, a.memory_MiB << 20};
     const std::size_t finest = finest_elements(predicted->scene, a.elements);
     try {
@@ -251,11 +257,12 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
   if (a.target_error.empty()) {
     predicted->prediction = solve(options);
   } else {
-    if (options.elements == PredictOptions{}.elements) options.elements = kFirstElements;
-    auto targeted = predict_to_target(options, *share_of(a.target_error), solve);
-    predicted->prediction = std::move(targeted.prediction);
-    predicted->target_steps = std::move(targeted.steps);
-    predicted->misses_target = !targeted.is_reached;
+    if (options.elements == PredictOptions{}.elements)
+      options.elements = std::max(kFirstElements, least_reliable_elements(predicted->scene));
+    predicted->target = predict_to_target(options, *share_of(a.target_error), solve,
+                                          a.judge ? a.judge : relative_bound_of_surfaces);
+    predicted->prediction = std::move(predicted->target.prediction);
+    predicted->misses_target = !predicted->target.is_reached;
   }
   predicted->seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -306,6 +313,22 @@ std::string describe_links(const Prediction& prediction) {
                              [](const LinkSummary& l) { return static_cast<double>(l.links); }),
              fitted_exponent(prediction, [](const LinkSummary& l) { return l.processor_s; }),
              links.processor_s);
+}
+
+std::string describe_target(const Predicted& p) {
+  std::string text;
+  for (const TargetStep& step : p.target.steps)
+    text += fmt::format("  {} elements: largest bound {:.3g} % ({})\n", step.elements,
+                        100.0 * step.relative_bound, step.where);
+  if (!p.misses_target) return text;
+  const double fits = p.target.elements_that_fit;
+  return text + fmt::format("  the target error is not reached: it is foretold to take some {:.2g} "
+                            "elements ({:.2g} MiB as a matrix), and no more than {:.0f} fit; these "
+                            "would reach some {:.2g} %. More --memory, --form-factors streamed (no "
+                            "matrix, much slower) or --adaptive (fewer elements) reach further\n",
+                            p.target.elements_needed,
+                            std::pow(p.target.elements_needed, 2) * sizeof(double) / (1 << 20),
+                            fits, 100.0 * p.target.bound_that_fits);
 }
 
 }  // namespace
@@ -361,11 +384,7 @@ std::string describe(const Predicted& p) {
     text += fmt::format("  mean error bound: grids {:.2g} %, form factors {:.1g} %, {} {:.1g} %\n",
                         100.0 * shares->discretisation, 100.0 * shares->form_factors,
                         grid.links ? "links and solver" : "solver", 100.0 * shares->solver);
-  for (const TargetStep& step : p.target_steps)
-    text += fmt::format("  {} elements: means of surfaces bound to {:.3g} %\n", step.elements,
-                        100.0 * step.relative_bound);
-  if (p.misses_target)
-    text += "  the target error is not reached: finer grids do not fit the memory limit\n";
+  text += describe_target(p);
   if (grid.links)
     text +=
         "  error bound: an estimate only, with three times what the links are thought to leave "
@@ -379,34 +398,20 @@ std::string describe(const Predicted& p) {
 }
 
 std::vector<SurfaceMean> surface_means(const Prediction& prediction) {
-  const PatchMesh& mesh = prediction.fine().mesh;
-  const BandMatrix radiosity = prediction.radiosity();
-  const BandMatrix bound = prediction.surface_irradiance_bound();
-  const BandMatrix irradiance = prediction.irradiance();
+  const Scene& scene = prediction.scene();
+  const SurfaceMeans of = prediction.surface_means();
   std::vector<SurfaceMean> means;
-  for (const Surface& surface : prediction.scene().surfaces) {
-    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(radiosity.cols());
-    means.push_back({surface.name, 0.0, zero, zero, zero});
-  }
-  for (std::size_t i = 0; i < mesh.size(); ++i) {
-    if (!prediction.fine().usable[i]) continue;
-    SurfaceMean& mean = means[mesh.surface_of(mesh.patches[i])];
-    const auto row = static_cast<Eigen::Index>(i);
-    const double area = prediction.fine().free_area_m2[row];
-    mean.area_m2 += area;
-    mean.radiosity += area * radiosity.row(row).transpose();
-    mean.irradiance += area * irradiance.row(row).transpose();
-  }
-  for (std::size_t k = 0; k < means.size(); ++k) {
-    const auto& rho = prediction.scene().material_of(prediction.scene().surfaces[k]).reflectance;
-    const Eigen::Map<const Eigen::VectorXd> reflectance(rho.values.data(), bound.cols());
-    means[k].radiosity_bound =
-        reflectance.cwiseProduct(bound.row(static_cast<Eigen::Index>(k)).transpose());
-  }
-  std::erase_if(means, [](const SurfaceMean& m) { return m.area_m2 == 0.0; });
-  for (SurfaceMean& mean : means) {
-    mean.radiosity /= mean.area_m2;
-    mean.irradiance /= mean.area_m2;
+  for (std::size_t s = 0; s < scene.surfaces.size(); ++s) {
+    const auto row = static_cast<Eigen::Index>(s);
+    if (of.area_m2[row] == 0.0) continue;
+    const Material& material = scene.material_of(scene.surfaces[s]);
+    const Eigen::Map<const Eigen::VectorXd> rho(material.reflectance.values.data(),
+                                                of.irradiance.cols()),
+        exitance(material.exitance.values.data(), of.irradiance.cols());
+    means.push_back({scene.surfaces[s].name, of.area_m2[row],
+                     exitance + rho.cwiseProduct(of.irradiance.row(row).transpose()),
+                     rho.cwiseProduct(of.error_bound.row(row).transpose()),
+                     of.irradiance.row(row).transpose(), of.error_bound.row(row).transpose()});
   }
   return means;
 }

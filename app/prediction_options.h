@@ -33,6 +33,7 @@ struct PredictionArguments {
   std::size_t memory_MiB = 8192;
   double relative_bound = SolveOptions{}.relative_bound;
   std::string target_error;   ///< "0.5%" or "0.005": chooses elements and solver bound
+  Judge judge;                ///< of what has that error; empty: means of surfaces
   std::string adaptive;       ///< empty: uniform; else the goal, or kDefaultGoal
   bool gather_edges = false;  ///< the gathered field, see PredictOptions::gathered_up_to
   bool interpolated = false;  ///< the answer is interpolated between corners: for --auto
@@ -57,7 +58,7 @@ void add_prediction_options(CLI::App& command, PredictionArguments& arguments,
 struct Predicted {
   Scene scene;
   std::unique_ptr<Prediction> prediction;
-  std::vector<TargetStep> target_steps;  ///< the attempts, where a target error was asked for
+  TargetedPrediction target;  ///< without its prediction; the attempts, where an error was asked for
   bool misses_target = false;
   std::string plan;                    ///< what --auto decided, as a command line; empty without it
   std::vector<AdaptStep> adapt_steps;  ///< of the last mesh, where it was adapted
@@ -88,7 +89,7 @@ std::string describe(const Predicted& predicted);
 struct SurfaceMean {
   std::string surface;
   double area_m2 = 0.0;
-  Eigen::VectorXd radiosity, radiosity_bound, irradiance;
+  Eigen::VectorXd radiosity, radiosity_bound, irradiance, irradiance_bound;
 };
 std::vector<SurfaceMean> surface_means(const Prediction& prediction);
 

@@ -67,8 +67,10 @@ nlohmann::json summary_json(const Predicted& p) {
   const GridSolution& grid = p.prediction->fine();
   const FormFactorSummary& f = grid.form_factors;
   nlohmann::json attempts = nlohmann::json::array();
-  for (const TargetStep& step : p.target_steps)
-    attempts.push_back({{"elements", step.elements}, {"relative_bound", step.relative_bound}});
+  for (const TargetStep& step : p.target.steps)
+    attempts.push_back({{"elements", step.elements},
+                        {"relative_bound", step.relative_bound},
+                        {"where", step.where}});
   nlohmann::json shares;
   if (const auto& found = p.prediction->error_shares())
     shares = {{"discretisation", found->discretisation},
@@ -119,7 +121,8 @@ nlohmann::json solution_json(const Predicted& p) {
                                 {"area", mean.area_m2},
                                 {"radiosity", values(mean.radiosity)},
                                 {"radiosity_error_bound", values(mean.radiosity_bound)},
-                                {"irradiance", values(mean.irradiance)}});
+                                {"irradiance", values(mean.irradiance)},
+                                {"irradiance_error_bound", values(mean.irradiance_bound)}});
   for (const SurfaceFlux& flux : net_fluxes(*p.prediction))
     for (auto& surface : json["surfaces"])
       if (surface["name"] == flux.surface) {

@@ -202,35 +202,4 @@ ErrorShares Prediction::find_error_shares(const Level& resampled) const {
   return shares;
 }
 
-BandMatrix Prediction::surface_irradiance_bound() const {
-  const auto surfaces = static_cast<Index>(scene_->surfaces.size());
-  BandMatrix all = BandMatrix::Zero(surfaces, static_cast<Index>(scene_->bands.size()));
-  if (!needs_.interreflection) return all;
-  const PatchMesh &mesh = fine().mesh, &next = coarse().mesh;
-  const Index bands = fine().indirect.cols();
-  BandMatrix children = BandMatrix::Zero(coarse().indirect.rows(), bands);
-  Eigen::VectorXd children_area = Eigen::VectorXd::Zero(children.rows());
-  for (std::size_t i = 0; i < mesh.size(); ++i) {
-    if (!fine().usable[i]) continue;
-    const double area = fine().free_area_m2[static_cast<Index>(i)];
-    const Patch& patch = mesh.patches[i];
-    const std::uint32_t parent = levels_[1]->smooth().find_patch(patch.piece, patch.centroid);
-    children.row(parent) += area * fine().indirect.row(static_cast<Index>(i));
-    children_area[parent] += area;
-  }
-  Eigen::VectorXd area = Eigen::VectorXd::Zero(surfaces);
-  BandMatrix sum = BandMatrix::Zero(surfaces, bands);
-  for (std::size_t p = 0; p < next.size(); ++p) {
-    const auto row = static_cast<Index>(p);
-    const auto surface = static_cast<Index>(next.surface_of(next.patches[p]));
-    sum.row(surface) +=
-        (children.row(row) - children_area[row] * coarse().indirect.row(row)).cwiseAbs();
-    area[surface] += children_area[row];
-  }
-  const Eigen::VectorXd solver = solver_bounds();
-  for (Index s = 0; s < surfaces; ++s)
-    if (area[s] > 0.0) all.row(s) = expand(sum.row(s).transpose() / area[s] + solver).transpose();
-  return all;
-}
-
 }  // namespace truebox
