@@ -97,11 +97,12 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       ->capture_default_str()
       ->check(CLI::IsMember(methods));
   command
-      .add_option("--form-factors", a.form_factors,
-                  "exact-visibility (shadow outlines, no noise) or ray-casting: a matrix of all "
-                  "pairs; streamed: the same as exact-visibility without keeping it, for little "
-                  "memory and some forty times the time; hierarchical: links between groups of "
-                  "elements, for many elements")
+      .add_option(
+          "--form-factors", a.form_factors,
+          "exact-visibility (shadow outlines, no noise) or ray-casting: a matrix of all "
+          "pairs; streamed: the same as exact-visibility without keeping it, for little "
+          "memory and forty to seventy times the time; hierarchical: links between groups of "
+          "elements, for many elements")
       ->capture_default_str()
       ->check(CLI::IsMember({"exact-visibility", "ray-casting", "streamed", "hierarchical"}));
   command
@@ -122,10 +123,11 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       ->capture_default_str()
       ->check(CLI::Range(1e-13, 0.5));
   command
-      .add_option("--target-error", a.target_error,
-                  "choose elements and solver bound so that the error bound of what is asked for is "
-                  "this share (\"0.5%\" or 0.005) of its irradiance or less: of each place of probe, "
-                  "else of each surface's mean; in every band")
+      .add_option(
+          "--target-error", a.target_error,
+          "choose elements and solver bound so that the error bound of what is asked for is "
+          "this share (\"0.5%\" or 0.005) of its irradiance or less: of each place of probe, "
+          "else of each surface's mean; in every band")
       ->check(check_share);
   command.add_flag(std::string("--adaptive{") + kDefaultGoal + "}", a.adaptive,
                    "refine where the error comes from instead of everywhere; =everywhere, "
@@ -296,6 +298,32 @@ std::string describe_repair(const FormFactorSummary& f) {
       f.repair_rms, f.repair_max, f.repair_negative);
 }
 
+// "4900000": what is foretold to two digits.
+std::string two_digits(double x) {
+  const double unit = std::pow(10.0, std::floor(std::log10(x)) - 1.0);
+  return fmt::format("{:.0f}", x < 10.0 ? x : unit * std::round(x / unit));
+}
+
+// Lamps that nothing sees and scenes without any: why all is dark.
+std::string describe_darkness(const Predicted& p) {
+  const PatchMesh& mesh = p.prediction->fine().mesh;
+  std::vector<char> sees(p.scene.surfaces.size(), 0);
+  for (std::size_t i = 0; i < mesh.size(); ++i)
+    sees[mesh.surface_of(mesh.patches[i])] |= p.prediction->fine().usable[i];
+  bool is_lit = false;
+  std::string text;
+  for (std::size_t s = 0; s < sees.size(); ++s) {
+    const Surface& surface = p.scene.surfaces[s];
+    const bool emits = p.scene.material_of(surface).emits();
+    is_lit = is_lit || emits;
+    if (!sees[s] && !surface.is_opening)
+      text +=
+          fmt::format("  {}{} faces no surface of the scene and is left out{}\n", surface.name,
+                      emits ? ", which emits," : "", emits ? ": its light reaches nothing" : "");
+  }
+  return is_lit ? text : text + "  no surface emits: all of the scene is dark\n";
+}
+
 std::string describe_links(const Prediction& prediction) {
   const LinkSummary& links = *prediction.fine().links;
   return fmt::format(
@@ -315,23 +343,30 @@ std::string describe_links(const Prediction& prediction) {
              links.processor_s);
 }
 
+}  // namespace
+
+std::string name_of_band(const Scene& scene, std::size_t band) {
+  return scene.is_total ? "all wavelengths" : fmt::format("{:.0f} nm", scene.bands.centre_nm(band));
+}
+
 std::string describe_target(const Predicted& p) {
   std::string text;
   for (const TargetStep& step : p.target.steps)
     text += fmt::format("  {} elements: largest bound {:.3g} % ({})\n", step.elements,
                         100.0 * step.relative_bound, step.where);
   if (!p.misses_target) return text;
+  if (p.target.elements_needed == 0.0)
+    return text + "  the target error is not reached: " + p.prediction->fine().solve.brief() + "\n";
   const double fits = p.target.elements_that_fit;
-  return text + fmt::format("  the target error is not reached: it is foretold to take some {:.2g} "
-                            "elements ({:.2g} MiB as a matrix), and no more than {:.0f} fit; these "
-                            "would reach some {:.2g} %. More --memory, --form-factors streamed (no "
-                            "matrix, much slower) or --adaptive (fewer elements) reach further\n",
-                            p.target.elements_needed,
-                            std::pow(p.target.elements_needed, 2) * sizeof(double) / (1 << 20),
-                            fits, 100.0 * p.target.bound_that_fits);
+  return text + fmt::format(
+                    "  the target error is not reached: some {} elements are foretold for it ({} "
+                    "MiB as a matrix); {:.0f} fit, for which a bound of {:.2g} % is foretold\n"
+                    "  further reach: more --memory, --adaptive (fewer elements) or --form-factors "
+                    "streamed (no matrix, much slower)\n",
+                    two_digits(p.target.elements_needed),
+                    two_digits(std::pow(p.target.elements_needed, 2) * sizeof(double) / (1 << 20)),
+                    fits, 100.0 * p.target.bound_that_fits);
 }
-
-}  // namespace
 
 std::string describe(const Predicted& p) {
   const GridSolution& grid = p.prediction->fine();
@@ -369,6 +404,7 @@ std::string describe(const Predicted& p) {
   if (f.buried_patches > 0)
     text +=
         fmt::format("  {} elements lie under another surface and see nothing\n", f.buried_patches);
+  text += describe_darkness(p);
   if (f.covered_patches > 0)
     text += fmt::format("  {} elements lie partly under another surface: their free parts count\n",
                         f.covered_patches);

@@ -58,7 +58,8 @@ void add_prediction_options(CLI::App& command, PredictionArguments& arguments,
 struct Predicted {
   Scene scene;
   std::unique_ptr<Prediction> prediction;
-  TargetedPrediction target;  ///< without its prediction; the attempts, where an error was asked for
+  TargetedPrediction
+      target;  ///< without its prediction; the attempts, where an error was asked for
   bool misses_target = false;
   std::string plan;                    ///< what --auto decided, as a command line; empty without it
   std::vector<AdaptStep> adapt_steps;  ///< of the last mesh, where it was adapted
@@ -81,6 +82,12 @@ const CameraDescription& find_camera(const Scene& scene, const std::string& name
 
 /// A progress line on stderr if that is a terminal, nothing otherwise.
 Progress terminal_progress(bool quiet = false);
+
+/// The attempts at a target error, a line each, and what is possible where it was not reached.
+std::string describe_target(const Predicted& predicted);
+
+/// "552 nm", or "all wavelengths".
+std::string name_of_band(const Scene& scene, std::size_t band);
 
 /// What the solve did, as text for a person: elements, form factors, closure, solver, time.
 std::string describe(const Predicted& predicted);

@@ -147,11 +147,7 @@ void print_surfaces(const Predicted& p) {
       bands < 3 ? std::vector<std::size_t>{0}
                 : std::vector<std::size_t>{bands / 4, bands / 2, 3 * bands / 4};
   fmt::print("{:<20}", "mean radiosity of");
-  for (std::size_t b : shown)
-    fmt::print(
-        "{:>17}{:>10}",
-        p.scene.is_total ? "all wavelengths" : fmt::format("{:.0f} nm", p.scene.bands.centre_nm(b)),
-        "bound");
+  for (std::size_t b : shown) fmt::print("{:>17}{:>10}", name_of_band(p.scene, b), "bound");
   fmt::print("   ({})\n", p.scene.exitance_unit());
   std::size_t printed = 0;
   for (const SurfaceMean& mean : surface_means(*p.prediction)) {
@@ -279,9 +275,9 @@ void add_solve_command(CLI::App& program, Action& chosen) {
       "table; truebox merge puts the parts of an array together.");
   command
       ->add_option("--basis", arguments->basis,
-                   "radiosity on an element: constant, or polynomials (Galerkin), for scenes in "
-                   "which nothing stands between two surfaces: means of the surfaces to many "
-                   "digits; --elements is some hundreds then")
+                   "radiosity on an element: constant, or polynomials (Galerkin): means of the "
+                   "surfaces, to many digits where nothing stands between two of them; --elements "
+                   "is some hundreds then")
       ->capture_default_str()
       ->check(CLI::IsMember(basis_names()));
   command->callback([=, &chosen] {

@@ -25,13 +25,13 @@ std::string held_text(const SweepPoint& p) {
 }
 
 void print(const Sweep& sweep) {
-  fmt::print("{}\nerror: {}\nagainst: {}\n{:<25}{:<24}{:>10}{:>11}{:>11}{:>11}{:>11}\n",
+  fmt::print("{}\nerror: {}\nagainst: {}\n{:<25}{:<24}{:>10}{:>11}{:>11}{:>11}{:>11}  work\n",
              sweep.title, sweep.error_name, sweep.reference, "method", "setting", "time / s",
              "error", "largest", "bound", "bound held");
   for (const SweepPoint& p : sweep.points)
-    fmt::print("{:<25}{:<24}{:>10.3g}{:>11.2e}{:>11.2e}{:>11.2e}{:>11}{}\n", p.method, p.setting,
-               p.cpu_s, p.error, p.largest_error, p.bound, held_text(p),
-               p.on_front ? "  front" : "");
+    fmt::print("{:<25}{:<24}{:>10.3g}{:>11.2e}{:>11.2e}{:>11.2e}{:>11}  {}{}\n", p.method,
+               p.setting, p.cpu_s, p.error, p.largest_error, p.bound, held_text(p), p.work,
+               p.on_front ? ", front" : "");
   fmt::print("The reference itself is good to {:.2g}. * the method calls this bound an estimate.\n",
              sweep.floor);
 }
@@ -171,7 +171,8 @@ Report report_of(const Sweep& sweep,
       quick.setting, 100.0 * best.error, best.cpu_s, best.method, best.setting);
   report.key_numbers = {{"smallest error", 100.0 * best.error, "%", 2, best.method},
                         {"reference's own error", 100.0 * sweep.floor, "%", 2, "k = 1"},
-                        {"settings", static_cast<double>(sweep.points.size()), "1", 3, ""}};
+                        {"settings", static_cast<double>(sweep.points.size()), "1",
+                         static_cast<int>(std::to_string(sweep.points.size()).size()), ""}};
   Section trade{"Error against time", {}};
   trade.blocks.push_back(Figure{
       "Error against processor time", as_svg(sweep),

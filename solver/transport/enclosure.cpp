@@ -112,7 +112,7 @@ bool is_free(const PatchMesh& mesh, const Scene& scene, const Visibility& visibi
              std::size_t patch, const Vec3& point) {
   const Vec3& normal = mesh.plane_of(mesh.patches[patch]).normal;
   const auto hit = visibility.first_hit(point + visibility.offset_m() * normal, normal, true);
-  return hit && hit->front && !lies_on_a_back(mesh, scene, patch, point);
+  return (!hit || hit->front) && !lies_on_a_back(mesh, scene, patch, point);
 }
 
 bool is_partly_covered(const PatchMesh& mesh, const Scene& scene, std::size_t patch,
@@ -121,6 +121,22 @@ bool is_partly_covered(const PatchMesh& mesh, const Scene& scene, std::size_t pa
   Polygon element;
   mesh.polygon_of(mesh.patches[patch], element);
   return is_crossed(element, scene);
+}
+
+double free_area_in_open_m2(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+                            std::size_t patch, double row_sum_m2) {
+  constexpr int kPoints = 48;  // squared
+  const double area_m2 = mesh.patches[patch].area_m2;
+  Polygon element;
+  mesh.polygon_of(mesh.patches[patch], element);
+  if (!is_crossed(element, scene)) return area_m2;
+  int free = 0;
+  for (int k = 0; k < kPoints * kPoints; ++k)
+    free += is_free(
+        mesh, scene, visibility, patch,
+        sample_polygon(element, (k / kPoints + 0.5) / kPoints, (k % kPoints + 0.5) / kPoints));
+  if (free == 0) return area_m2;
+  return std::clamp(area_m2 * free / (kPoints * kPoints), std::min(row_sum_m2, area_m2), area_m2);
 }
 
 std::vector<char> whole_patches(const PatchMesh& mesh, const Scene& scene,

@@ -13,10 +13,10 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kReserve = 1.15;     // elements beyond the foretold: a miss costs another solve
-constexpr double kLargestStep = 3.0;  // a ninth of the cost before; further, foretelling is poor
-constexpr double kSmallestStep = 1.3;
-constexpr double kForetellsTo = 2.0;  // factor of elements
+constexpr double kReserve = 1.15;  // elements beyond the foretold: a miss costs another solve
+// Edges halved once: some sixteenth of the cost is behind, and then the grids show their order.
+constexpr double kLargestStep = 4.0;
+constexpr double kSmallestStep = 1.5;  // bounds go up and down by a fifth from mesh to mesh
 constexpr double kMostElements = 200000.0;
 
 double elements_that_fit(const PredictOptions& options) {
@@ -29,17 +29,17 @@ double least_elements(const PatchMesh& mesh) {
   return 1.1 * Prediction::kPatchesAPiece * static_cast<double>(mesh.pieces.size());
 }
 
-double foretold_elements(const Prediction& prediction, const RelativeBound& bound, double target) {
+// The bound falls like elements^(-3/4).
+double foretold_elements(const Prediction& prediction, double bound, double target) {
   const double n = static_cast<double>(prediction.fine().mesh.size());
-  const double wanted = n * std::pow(bound.in_order / target, 2.0 / kGatheredOrder);
-  const double least =
-      prediction.bound_is_reliable() ? 0.0 : least_elements(prediction.fine().mesh);
-  return std::max({wanted, least, kSmallestStep / kReserve * n});
+  const double wanted = n * std::pow(bound / target, 2.0 / kGatheredOrder);
+  return prediction.bound_is_reliable() ? wanted
+                                        : std::max(wanted, least_elements(prediction.fine().mesh));
 }
 
 std::string name_of_band(const Scene& scene, std::size_t band) {
   if (scene.is_total) return "all wavelengths";
-  return std::to_string(std::lround(scene.bands.centre_nm(band))) + " nm";
+  return std::to_string(std::lround(scene.bands.centre_nm(band))).append(" nm");
 }
 
 }  // namespace
@@ -104,15 +104,14 @@ TargetedPrediction predict_to_target(const PredictOptions& options, double relat
     // A bound that may not hold is no bound: the grids must be fine enough for it first.
     result.is_reached = bound.value <= relative_error && prediction.bound_is_reliable();
     if (result.is_reached || prediction.fine().links) return result;
-    const double wanted = foretold_elements(prediction, bound, relative_error);
-    result.elements_needed = wanted;
-    result.bound_that_fits =
-        bound.in_order * std::pow(elements / result.elements_that_fit, 0.5 * kGatheredOrder);
-    if (wanted > kForetellsTo * result.elements_that_fit ||
-        kSmallestStep * elements > result.elements_that_fit)
-      return result;
+    // Refused is only what is out of reach even if the grids converge as they should.
+    const double fits = result.elements_that_fit;
+    result.elements_needed = foretold_elements(prediction, bound.in_order, relative_error);
+    result.bound_that_fits = bound.in_order * std::pow(elements / fits, 0.5 * kGatheredOrder);
+    if (result.elements_needed > fits || kSmallestStep * elements > fits) return result;
+    const double wanted = kReserve * foretold_elements(prediction, bound.value, relative_error);
     const double next =
-        std::min({kReserve * wanted, kLargestStep * elements, result.elements_that_fit});
+        std::min(std::clamp(wanted, kSmallestStep * elements, kLargestStep * elements), fits);
     attempt.elements =
         static_cast<std::size_t>(static_cast<double>(attempt.elements) * next / elements);
   }

@@ -45,13 +45,13 @@ using Judge = std::function<RelativeBound(const Prediction&)>;
 /// Chooses grid and tolerances so that the bound that `judge` finds is at most `relative_error`.
 /// The bound meets the target, not the foretelling: a coarse solve (`options.elements`, or what the
 /// bound needs to be reliable) foretells the elements (the bound falls like elements^(-3/4), the
-/// gathered order 1.5), the next solve takes them, though no more than three times as many as the
-/// last, so that all solves together cost little more than the last. The solver's share of the
-/// error is a thousandth; that of form factors by exact visibility is far below the grids' in any
-/// case. What is foretold to take more than twice the elements that fit `memory_limit_bytes` (or
-/// 200,000 without a matrix) is not tried.
+/// gathered order 1.5), and the next solve takes them, though no more than four times as many as
+/// the last, so that the coarser ones cost little. The solver's share of the error is a thousandth;
+/// that of form factors by exact visibility is far below the grids' in any case. What is foretold
+/// to take more elements than fit `memory_limit_bytes` (without a matrix: than 200,000) is not
+/// tried.
 /// Throws std::invalid_argument unless 0 < relative_error < 1; std::length_error if not even the
-/// first attempt fits the memory limit. Links bound nothing: they are never reached.
+/// first attempt fits the memory limit. Links bound nothing: they never reach it.
 TargetedPrediction predict_to_target(const Scene& scene, const PredictOptions& options,
                                      double relative_error);
 TargetedPrediction predict_to_target(const PredictOptions& options, double relative_error,

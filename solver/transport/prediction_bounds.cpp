@@ -190,14 +190,23 @@ ErrorShares Prediction::find_error_shares(const Level& resampled) const {
     grids += surface_m2 * bound.row(static_cast<Index>(s)).transpose();
   }
   const Eigen::VectorXd total = expand(mean.transpose()), rays = expand(sampling.transpose()),
-                        solver = expand(solver_bounds());
+                        all_but_grids = expand(solver_bounds());
+  // What rows still miss is the factors' doing, not the solver's; with links the two are not told
+  // apart.
+  Eigen::VectorXd solver = all_but_grids;
+  if (!fine().links) {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(fine().indirect.cols());
+    for (const auto& level : levels_) sum += level->solution.solve.error_bound;
+    solver = expand(sum);
+  }
   ErrorShares shares;
   for (Index k = 0; k < total.size(); ++k) {
     if (!(total[k] > 0.0)) continue;
-    shares.form_factors = std::max(shares.form_factors, rays[k] / total[k]);
+    shares.form_factors =
+        std::max(shares.form_factors, (rays[k] + (all_but_grids[k] - solver[k]) * area) / total[k]);
     shares.solver = std::max(shares.solver, solver[k] * area / total[k]);
     shares.discretisation =
-        std::max(shares.discretisation, (grids[k] - solver[k] * area) / total[k]);
+        std::max(shares.discretisation, (grids[k] - all_but_grids[k] * area) / total[k]);
   }
   return shares;
 }

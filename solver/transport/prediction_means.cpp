@@ -12,7 +12,9 @@ namespace {
 using Eigen::Index;
 
 constexpr double kSafety = 1.25;     // of an order that three grids show: Roache (1998)
-constexpr double kLeastOrder = 1.0;  // taken where they show less: no assumption but the old one
+constexpr double kLeastOrder = 1.0;  // taken where they show less, or nothing
+// Of the coarsest grid on a surface: fewer agree with their children by chance, whatever the order.
+constexpr int kElementsThatShowOrder = 4;
 
 // What the extrapolated value may still be wrong by, over the difference between its two grids.
 double left_of_difference(double order) {
@@ -67,11 +69,15 @@ BandMatrix Prediction::surface_irradiance_bound() const {
 
 // Of the larger difference, each surface and band by the order that its grids show.
 BandMatrix Prediction::bound_factors(const BandMatrix& finer, const BandMatrix& coarser) const {
+  const GridSolution& last = coarsest();
+  Eigen::VectorXi elements = Eigen::VectorXi::Zero(finer.rows());
+  for (std::size_t i = 0; i < last.mesh.size(); ++i)
+    if (last.usable[i]) ++elements[static_cast<Index>(last.mesh.surface_of(last.mesh.patches[i]))];
   BandMatrix factor(finer.rows(), finer.cols());
   for (Index s = 0; s < factor.rows(); ++s)
     for (Index k = 0; k < factor.cols(); ++k) {
-      const double order =
-          finer(s, k) > 0.0 ? std::log2(coarser(s, k) / finer(s, k)) : kGatheredOrder;
+      const bool shows_order = elements[s] >= kElementsThatShowOrder && finer(s, k) > 0.0;
+      const double order = shows_order ? std::log2(coarser(s, k) / finer(s, k)) : kLeastOrder;
       factor(s, k) = kSafety * left_of_difference(std::clamp(order, kLeastOrder, kGatheredOrder));
     }
   return factor;
@@ -104,8 +110,7 @@ SurfaceMeans Prediction::surface_means() const {
     mean = (mean + finer.with_sign / kRichardson).cwiseMax(0.0);
     if (is_uniform_) {
       const BandMatrix coarser = surface_differences(1, 2).without_sign;
-      const BandMatrix guarded =
-          finer.without_sign.cwiseMax(std::exp2(-kGatheredOrder) * coarser);
+      const BandMatrix guarded = finer.without_sign.cwiseMax(std::exp2(-kGatheredOrder) * coarser);
       BandMatrix bound = guarded.cwiseProduct(bound_factors(finer.without_sign, coarser));
       BandMatrix in_order = kSafety * left_of_difference(kGatheredOrder) * finer.without_sign;
       bound.rowwise() += solver_bounds().transpose();
