@@ -361,8 +361,8 @@ std::string describe_target(const Predicted& p) {
   return text + fmt::format(
                     "  the target error is not reached: some {} elements are foretold for it ({} "
                     "MiB as a matrix); {:.0f} fit, for which a bound of {:.2g} % is foretold\n"
-                    "  further reach: more --memory, --adaptive (fewer elements) or --form-factors "
-                    "streamed (no matrix, much slower)\n",
+                    "  further reach: more --memory, or --form-factors streamed (no matrix, much "
+                    "slower)\n",
                     two_digits(p.target.elements_needed),
                     two_digits(std::pow(p.target.elements_needed, 2) * sizeof(double) / (1 << 20)),
                     fits, 100.0 * p.target.bound_that_fits);

@@ -130,7 +130,7 @@ TEST_P(PartlyCoveredInTheOpen, SunkenBlockLightsTheRoomAsOneThatStandsOnTheFloor
     return scene;
   };
   const Scene sunk_scene = opened(-0.07), standing_scene = opened(0.0);
-  const std::size_t elements = GetParam() == Way::streamed ? 250 : 800;
+  const std::size_t elements = GetParam() == Way::streamed ? 150 : 800;
   const auto sunk_solution = solved(sunk_scene, GetParam(), elements);
   const auto standing_solution = solved(standing_scene, GetParam(), elements);
   ASSERT_FALSE(sunk_solution->fine().form_factors.closed);
@@ -141,7 +141,7 @@ TEST_P(PartlyCoveredInTheOpen, SunkenBlockLightsTheRoomAsOneThatStandsOnTheFloor
   for (std::size_t s = 0; s < standing.area_m2.size(); ++s) {
     if (standing.area_m2[s] == 0.0) continue;  // the block's underside
     const auto row = static_cast<Index>(s);
-    // Free areas are found to 1 % of an element's, those of few elements.
+    // Free areas are found to 2 % of an element's, of few elements.
     EXPECT_NEAR(sunk.area_m2[s], standing.area_m2[s], 0.01 * standing.area_m2[s])
         << sunk_scene.surfaces[s].name;
     EXPECT_NEAR(sunk.irradiance[s], standing.irradiance[s],

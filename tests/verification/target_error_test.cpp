@@ -181,10 +181,10 @@ TEST(SurfaceMeans, AreWithinTheirBoundOfCertifiedOnesAndCloserThanTheFinestGridA
 }
 
 // The block's faces have one element each on the coarsest grid: two such agree by chance, which
-// must not be taken for a high order. Truth: 6000 elements, whose bound is a fifth of these.
+// must not be taken for a high order. Truth: 4500 elements, whose bound is a fourth of these.
 TEST(SurfaceMeans, AreWithinTheirBoundInABlockedRoomWhereGridsAgreeByChance) {
   const Scene scene = blocked_room(0.95);
-  const SurfaceMeans truth = Prediction(scene, {.elements = 6000}).surface_means();
+  const SurfaceMeans truth = Prediction(scene, {.elements = 4500}).surface_means();
   for (const std::size_t elements : {500u, 1000u, 2000u}) {
     const SurfaceMeans means = Prediction(scene, {.elements = elements}).surface_means();
     for (Index s = 0; s < means.irradiance.rows(); ++s) {
