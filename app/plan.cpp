@@ -17,6 +17,7 @@
 #include "planning/full_model.h"
 #include "radiometry/input_error.h"
 #include "scene/scene_file.h"
+#include "solve_basis.h"
 
 namespace truebox::app {
 namespace {
@@ -24,11 +25,13 @@ namespace {
 struct PlanArguments {
   PredictionArguments wished;
   std::string json, camera, surface;
+  bool rms = false;
   double target_colour = 0.0;
   bool verify = false;
   std::size_t verify_elements = 600;
 };
 
+constexpr double kNoSaving = 1.001;
 constexpr std::size_t kSurfacesShown = 24;
 
 const char* text_of(ErrorKind kind) {
@@ -48,12 +51,10 @@ std::string error_text(const Decision& d) {
 }
 
 std::string work_text(const Decision& d) {
-  if (d.work.empty()) return {};
+  if (d.work.empty() || d.saving() <= kNoSaving) return {};
   const double saving = d.saving();
-  return fmt::format("{:.3g} {} instead of {:.3g}{}", d.planned_work, d.work, d.full_work,
-                     std::isinf(saving) ? ": none left"
-                     : saving > 1.001   ? fmt::format(": {:.3g} times less", saving)
-                                        : std::string());
+  return fmt::format("{:.3g} {} instead of {:.3g}: {}", d.planned_work, d.work, d.full_work,
+                     std::isinf(saving) ? "none left" : fmt::format("{:.3g} times less", saving));
 }
 
 std::string decisions_text(const Plan& plan) {
@@ -98,6 +99,7 @@ std::string colour_text(const std::vector<BandChoice>& choices, const BandChoice
 }
 
 std::string claims_text(const std::vector<ClaimCheck>& claims) {
+  if (claims.empty()) return "held to the full model: nothing is left out of it\n";
   std::string text =
       fmt::format("held to the full model\n  {:<28}{:>11}{:>11}  {:<14}{:>12}{:>12}{:>12}\n",
                   "claim", "planned", "full", "work", "time x", "difference", "allowed");
@@ -150,6 +152,7 @@ nlohmann::json plan_json(const Scene& scene, const Plan& plan, const std::string
                          {"path_tracing", plan.needs.path_tracing},
                          {"method", methods[static_cast<int>(plan.method)]},
                          {"exchange", exchanges[static_cast<int>(plan.exchange)]},
+                         {"basis", basis_names()[static_cast<std::size_t>(plan.degree)]},
                          {"elements", plan.elements},
                          {"adapted", plan.mesh == PlannedMesh::adapted},
                          {"discontinuities", plan.discontinuities},
@@ -186,20 +189,24 @@ nlohmann::json claims_json(const std::vector<ClaimCheck>& claims) {
 }
 
 std::string expected_text(const Plan& plan) {
-  std::string text = "expected          ";
+  std::string text;
   if (plan.processor_s > 0.0)
-    text +=
-        fmt::format("{:.2g} s of processor time (within a factor of three), ", plan.processor_s);
-  return text + fmt::format("{} MiB of {}\n", plan.bytes >> 20,
-                            plan.exchange == PlannedExchange::hierarchical ? "links and elements"
-                            : plan.exchange == PlannedExchange::streamed   ? "radiosity"
-                                                                           : "form factors");
+    text = fmt::format("{:.2g} s of processor time (within a factor of three)", plan.processor_s);
+  if (plan.bytes > 0)
+    text += fmt::format("{}{:.2g} MiB of {}", text.empty() ? "" : ", ",
+                        static_cast<double>(plan.bytes) / (1 << 20),
+                        plan.exchange == PlannedExchange::hierarchical ? "links and elements"
+                        : plan.exchange == PlannedExchange::streamed   ? "radiosity"
+                                                                       : "form factors");
+  return text.empty() ? text : "expected          " + text + "\n";
 }
 
 PredictionArguments wished_of(const PlanArguments& a) {
   PredictionArguments wished = a.wished;
   if (!a.camera.empty()) wished.automatic = "camera:" + a.camera;
   if (!a.surface.empty()) wished.automatic = "surface:" + a.surface;
+  if (a.rms) wished.automatic = "irradiance";
+  wished.means_only = !a.rms && a.camera.empty() && !wished.interpolated;
   return wished;
 }
 
@@ -263,8 +270,15 @@ void add_plan_command(CLI::App& program, Action& chosen) {
                    "dE00 that fewer bands may change a colour by: how many bands that takes")
       ->check(CLI::Range(0.01, 100.0));
   auto* camera = command->add_option("--camera", a->camera, "what counts is what this camera sees");
-  command->add_option("--surface", a->surface, "what counts is the mean of this surface")
-      ->excludes(camera);
+  auto* surface =
+      command->add_option("--surface", a->surface, "what counts is the mean of this surface")
+          ->excludes(camera);
+  command
+      ->add_flag("--rms", a->rms,
+                 "what counts is the rms error of irradiance over all surfaces, relative to its "
+                 "mean: foretold, not bound; solve --auto=irradiance does the same")
+      ->excludes(camera)
+      ->excludes(surface);
   command->add_flag("--interpolated", a->wished.interpolated,
                     "values are interpolated between corners, as viewers of .vtu and .glb do: "
                     "whether elements should follow lines of light");

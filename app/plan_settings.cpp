@@ -7,6 +7,7 @@
 
 #include "radiometry/input_error.h"
 #include "scene/requirements.h"
+#include "solve_basis.h"
 
 namespace truebox::app {
 namespace {
@@ -38,9 +39,12 @@ Plan plan_for(const Scene& scene, const PredictionArguments& wished) {
   request.memory_limit_bytes = wished.memory_MiB << 20;
   request.progress = terminal_progress(wished.quiet);
   request.interpolated = wished.interpolated;
+  request.means_only = wished.means_only;
   request.camera = camera_of(scene, wished.automatic);
   if (!wished.automatic.empty() && wished.automatic != kDefaultGoal)
     request.goal = goal_of(scene, wished.automatic);
+  if (request.goal && request.goal->kind == Goal::Kind::irradiance)
+    request.measure = ErrorMeasure::rms_irradiance;
   return make_plan(scene, request);
 }
 
@@ -53,6 +57,10 @@ PredictionArguments applied(const Plan& plan, const PredictionArguments& wished)
   }
   if (a.target_error.empty()) a.target_error = kDefaultTarget;
   a.elements = plan.elements;
+  if (plan.degree > 0) {
+    a.basis = basis_names()[static_cast<std::size_t>(plan.degree)];
+    return a;
+  }
   a.relative_bound = plan.solver_bound;
   if (plan.exchange == PlannedExchange::hierarchical) {
     a.form_factors = "hierarchical";
@@ -64,6 +72,8 @@ PredictionArguments applied(const Plan& plan, const PredictionArguments& wished)
     a.form_factors = plan.form_factors == FormFactorMethod::exact_visibility ? "exact-visibility"
                                                                              : "ray-casting";
   }
+  if (plan.measure == ErrorMeasure::rms_irradiance)
+    a.target_error.clear();  // that is a target of means; this one was foretold
   a.discontinuities = plan.discontinuities;
   if (plan.mesh == PlannedMesh::adapted)
     a.adaptive = wished.automatic.empty() ? kDefaultGoal : wished.automatic;
@@ -76,6 +86,7 @@ std::string command_line(const Plan& plan, const PredictionArguments& a) {
       "truebox {} {}", plan.method == PlannedMethod::path_tracing ? "render" : "solve", a.scene);
   if (plan.method == PlannedMethod::path_tracing)
     return line + fmt::format(" --method path --samples {} -o FILE.exr", std::max(16, plan.paths));
+  if (a.basis != usual.basis) line += " --basis " + a.basis;
   line += fmt::format(" --elements {}", a.elements);
   if (!a.target_error.empty()) line += " --target-error " + a.target_error;
   if (a.form_factors != usual.form_factors) line += " --form-factors " + a.form_factors;

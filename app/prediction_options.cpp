@@ -151,7 +151,7 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
   auto* automatic = command.add_flag(
       std::string("--auto{") + kDefaultGoal + "}", a.automatic,
       "as truebox plan decides for --target-error (1%); =camera:NAME or =surface:NAME as for "
-      "--adaptive");
+      "--adaptive; =irradiance: the rms error of irradiance over all surfaces");
   for (const char* decided :
        {"--elements", "--rays", "--method", "--form-factors", "--link-tolerance", "--solver-bound",
         "--adaptive", "--discontinuities"})
@@ -172,12 +172,16 @@ const CameraDescription& find_camera(const Scene& scene, const std::string& name
 
 Progress terminal_progress(bool quiet) {
   if (quiet || !::isatty(STDERR_FILENO)) return {};
-  auto last = std::make_shared<int>(-1);
+  auto last = std::make_shared<std::pair<std::string, int>>("", -1);
   return [last](const std::string& stage, double share) {
-    const int percent = static_cast<int>(100.0 * share);
-    if (percent == *last) return;
-    *last = percent;
-    fmt::print(stderr, "\r{:<24}{:3d} %{}", stage, percent, percent == 100 ? "\r\033[K" : "");
+    const std::pair<std::string, int> now(stage, static_cast<int>(100.0 * share));
+    if (now == *last) return;
+    *last = now;
+    // The rest of the line may be that of a longer stage.
+    if (now.second == 100)
+      fmt::print(stderr, "\r\033[K");
+    else
+      fmt::print(stderr, "\r{:<24} {:3d} %\033[K", stage, now.second);
     std::fflush(stderr);
   };
 }
@@ -185,6 +189,7 @@ Progress terminal_progress(bool quiet) {
 std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
   auto predicted = std::make_unique<Predicted>();
   predicted->scene = read_scene_of(wished);
+  predicted->plan = wished.as_planned;
   const PredictionArguments a =
       wished.automatic.empty() ? wished : planned(predicted->scene, wished, predicted->plan);
   std::unique_ptr<tbb::global_control> limit;
@@ -238,8 +243,8 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
     return std::make_unique<Prediction>(predicted->scene, attempt);
   };
   if (!a.adaptive.empty()) {
-    if (a.solve_grid || options.find_exchange)
-      throw InputError("--adaptive", 0, "a matrix of form factors in one process",
+    if (a.solve_grid || a.form_factors == "streamed")
+      throw InputError("--adaptive", 0, "form factors that are kept, in one process",
                        a.solve_grid ? "--distributed" : "--form-factors " + a.form_factors);
     const Goal goal = goal_of(a, predicted->scene);
     solve = [&predicted, goal, &a](const PredictOptions& attempt) {

@@ -32,17 +32,20 @@ struct PredictionArguments {
   double link_tolerance = HierarchyOptions{}.relative_tolerance;
   std::size_t memory_MiB = 8192;
   double relative_bound = SolveOptions{}.relative_bound;
-  std::string target_error;   ///< "0.5%" or "0.005": chooses elements and solver bound
-  Judge judge;                ///< of what has that error; empty: means of surfaces
-  std::string adaptive;       ///< empty: uniform; else the goal, or kDefaultGoal
-  bool gather_edges = false;  ///< the gathered field, see PredictOptions::gathered_up_to
-  bool interpolated = false;  ///< the answer is interpolated between corners: for --auto
+  std::string target_error;        ///< "0.5%" or "0.005": chooses elements and solver bound
+  Judge judge;                     ///< of what has that error; empty: means of surfaces
+  std::string adaptive;            ///< empty: uniform; else the goal, or kDefaultGoal
+  bool gather_edges = false;       ///< the gathered field, see PredictOptions::gathered_up_to
+  bool interpolated = false;       ///< the answer is interpolated between corners: for --auto
+  bool means_only = false;         ///< the answer is means of surfaces alone: for --auto
+  std::string basis = "constant";  ///< of an element: see solve_basis.h
   /// "smooth", "constant", "averaged" or "least-squares"; empty where nothing was said: smooth
   std::string reconstruction;
   std::string repair = "scaling";  ///< or "least-squares" or "none"
   bool discontinuities = false;    ///< elements follow lines of light and shadow
   std::size_t bands = 0;           ///< lamp-weighted ones instead of the scene's; 0: the scene's
-  std::string automatic;  ///< empty: as said here; else as planned, for a goal or kDefaultGoal
+  std::string automatic;   ///< empty: as said here; else as planned, for a goal or kDefaultGoal
+  std::string as_planned;  ///< command line of the plan that these are the arguments of
   bool error_shares = false, sensitivities = false;  ///< as in PredictOptions
   SolveGrid solve_grid;                              ///< as in PredictOptions, and:
   decltype(PredictOptions::watch_finest) watch_finest;

@@ -12,6 +12,7 @@
 #include "export/solution_files.h"
 #include "image/image_file.h"
 #include "job_array.h"
+#include "plan_settings.h"
 #include "prediction_options.h"
 #include "radiometry/input_error.h"
 #include "ranks.h"
@@ -31,7 +32,6 @@ struct SolveArguments {
   std::string petsc_options;
   std::string snapshots, camera;
   ArrayArguments array;
-  std::string basis = "constant";
 };
 
 Observer observer() {
@@ -216,12 +216,27 @@ int solve_here(const SolveArguments& a, Ranks* ranks) {
   return predicted->misses_target ? kNotSolved : kAgrees;
 }
 
+// Nothing but means of surfaces is asked for, so that any basis would do.
+bool wants_means_only(const SolveArguments& a) {
+  return (a.output.empty() || a.output.ends_with(".json")) && a.summary.empty() &&
+         a.snapshots.empty() && !a.distributed && !a.prediction.sensitivities &&
+         a.prediction.reconstruction.empty();
+}
+
 int solve(const SolveArguments& a) {
-  if (a.basis != "constant") {
+  if (!a.prediction.automatic.empty() && wants_means_only(a)) {
+    SolveArguments as_planned = a;
+    as_planned.prediction.means_only = true;
+    std::string line;
+    as_planned.prediction = planned(read_scene_of(a.prediction), as_planned.prediction, line);
+    as_planned.prediction.as_planned = line;
+    return solve(as_planned);
+  }
+  if (a.prediction.basis != "constant") {
     if (!a.snapshots.empty() || a.distributed || !a.summary.empty())
       throw InputError("--basis", 0, "constant elements for snapshots, ranks and summaries",
-                       a.basis);
-    return solve_on_basis(a.prediction, a.basis, a.output);
+                       a.prediction.basis);
+    return solve_on_basis(a.prediction, a.output);
   }
   if (!a.snapshots.empty()) {
     if (a.distributed) throw InputError("--snapshots", 0, "one process", "--distributed");
@@ -274,14 +289,15 @@ void add_solve_command(CLI::App& program, Action& chosen) {
       "a\n"
       "table; truebox merge puts the parts of an array together.");
   command
-      ->add_option("--basis", arguments->basis,
+      ->add_option("--basis", arguments->prediction.basis,
                    "radiosity on an element: constant, or polynomials (Galerkin): means of the "
                    "surfaces, to many digits where nothing stands between two of them; --elements "
-                   "is some hundreds then")
+                   "is some hundreds then, or as --target-error asks")
       ->capture_default_str()
+      ->excludes(command->get_option("--auto"))
       ->check(CLI::IsMember(basis_names()));
   command->callback([=, &chosen] {
-    if (arguments->basis != "constant" && command->count("--elements") == 0)
+    if (arguments->prediction.basis != "constant" && command->count("--elements") == 0)
       arguments->prediction.elements = 0;  // as the degree has it
     chosen = [=] {
       return arguments->array.is_many()

@@ -13,9 +13,8 @@ std::vector<std::string> basis_names();
 
 /// `solve --basis linear` and above: radiosity as polynomials on elements (Galerkin), means of the
 /// surfaces with a bound that rests on no order of convergence, to the terminal and `output`
-/// (.json). InputError where something can come between two surfaces, or for options that only
-/// constant elements have. Returns an exit code.
-int solve_on_basis(const PredictionArguments& arguments, const std::string& basis,
-                   const std::string& output);
+/// (.json); on more elements until a target error is met. InputError for options that only constant
+/// elements have. Returns an exit code.
+int solve_on_basis(const PredictionArguments& arguments, const std::string& output);
 
 }  // namespace truebox::app

@@ -32,6 +32,8 @@ struct Sweep {
   std::string error_name;  ///< "rms relative error of 120 view factors"
   std::string reference;   ///< what the error is against, and how good that is
   double floor = 0.0;      ///< error of the reference itself: what lies below means nothing
+  double resolved = 0.0;   ///< above it errors can be told apart: the floor and its own uncertainty
+  std::vector<std::string> left_out;  ///< methods that were not run, with reasons
   std::vector<SweepPoint> points;
 };
 
@@ -69,8 +71,9 @@ std::unique_ptr<SweepSubject> sweep_view_factors(const Scene& scene, const Sweep
 std::unique_ptr<SweepSubject> sweep_radiosity(const Scene& scene, const SweepArguments& a);
 std::unique_ptr<SweepSubject> sweep_irradiance(const Scene& scene, const SweepArguments& a);
 
-/// Marks the Pareto front of time and error. Errors below the reference's own count as equal to it.
-void mark_front(std::vector<SweepPoint>& points, double floor = 0.0);
+/// Marks the Pareto front of time and error: who takes longer must be better by one percent of the
+/// error. Errors below `resolved` count as equal.
+void mark_front(std::vector<SweepPoint>& points, double resolved = 0.0);
 
 /// Points of a job, and what a sweep says of itself, as a ledger keeps them.
 nlohmann::json to_json(const std::vector<SweepPoint>& points);

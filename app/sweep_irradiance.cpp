@@ -69,6 +69,10 @@ class IrradianceSweep : public SweepSubject {
     sweep.error_name = "rms relative error";
     sweep.reference = reference_.source;
     sweep.floor = reference_.relative_error();
+    // The rms of n places is good to 1 / sqrt(2 n); bands of a place share their noise.
+    sweep.resolved =
+        sweep.floor * (1.0 + kSigmas / std::sqrt(2.0 * static_cast<double>(places_.size())));
+    sweep.left_out = left_out_;
     return sweep;
   }
 
@@ -108,6 +112,13 @@ class IrradianceSweep : public SweepSubject {
   }
 
   void list_settings() {
+    if (!is_lambertian_)
+      left_out_.push_back("all by radiosity: a surface is not Lambertian");
+    else if (ladder().empty())
+      left_out_.push_back(fmt::format(
+          "a matrix and adapted meshes: three grids of these pieces take {} elements or more, and "
+          "--largest-elements is {}",
+          smallest_elements(), arguments_.largest_elements));
     if (is_lambertian_) {
       list_matrices();
       list_adapted();
@@ -130,6 +141,7 @@ class IrradianceSweep : public SweepSubject {
     std::vector<std::size_t> elements;
     std::size_t last = 0;
     for (std::size_t n = smallest_elements(); n <= arguments_.largest_elements; n *= 2) {
+      if (n * n * sizeof(double) > FormFactorOptions{}.memory_limit_bytes) break;
       const std::size_t size = uniform_mesh(scene_, edge_for_count(scene_, n / 16), 2).size();
       if (size != last) elements.push_back(n);
       last = size;
@@ -145,7 +157,11 @@ class IrradianceSweep : public SweepSubject {
 
   void list_matrices() {
     for (const FormFactorMethod method :
-         {FormFactorMethod::ray_casting, FormFactorMethod::exact_visibility})
+         {FormFactorMethod::ray_casting, FormFactorMethod::exact_visibility}) {
+      if (method == FormFactorMethod::ray_casting && !requirements(scene_).occlusion) {
+        left_out_.push_back("a matrix by rays: nothing can stand between two surfaces");
+        continue;
+      }
       for (const std::size_t n : ladder()) {
         PredictOptions options;
         options.elements = n;
@@ -153,6 +169,7 @@ class IrradianceSweep : public SweepSubject {
         add(method == FormFactorMethod::ray_casting ? "matrix, rays" : "matrix, shadow outlines",
             fmt::format("{} elements", n), options);
       }
+    }
   }
 
   void list_adapted() {
@@ -205,7 +222,9 @@ class IrradianceSweep : public SweepSubject {
     answer.bound_is_promised = prediction->bound_is_reliable();
     answer.work = fmt::format("{} elements, {}", grid.mesh.size(),
                               grid.links ? fmt::format("{} links", grid.links->links)
-                                         : fmt::format("{} rays", grid.form_factors.rays));
+                              : grid.form_factors.rays > 0
+                                  ? fmt::format("{} rays", grid.form_factors.rays)
+                                  : fmt::format("{:.3g} passes", grid.solve.matrix_passes));
     return answer;
   }
 
@@ -244,6 +263,7 @@ class IrradianceSweep : public SweepSubject {
   std::vector<ProbePoint> places_;
   bool is_lambertian_ = true;
   std::vector<Setting> settings_;
+  std::vector<std::string> left_out_;
   IrradianceTable reference_;
 };
 

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <set>
+#include <tuple>
 
 #include "commands.h"
 #include "document/writers.h"
@@ -34,6 +36,7 @@ void print(const Sweep& sweep) {
                p.on_front ? ", front" : "");
   fmt::print("The reference itself is good to {:.2g}. * the method calls this bound an estimate.\n",
              sweep.floor);
+  for (const std::string& reason : sweep.left_out) fmt::print("left out: {}\n", reason);
 }
 
 nlohmann::json as_json(const Sweep& sweep) {
@@ -55,6 +58,8 @@ nlohmann::json as_json(const Sweep& sweep) {
           {"error", sweep.error_name},
           {"reference", sweep.reference},
           {"reference_error", sweep.floor},
+          {"errors_told_apart_above", sweep.resolved},
+          {"left_out", sweep.left_out},
           {"points", points}};
 }
 
@@ -155,6 +160,12 @@ std::vector<Check> checks_of(const Sweep& sweep) {
   return checks;
 }
 
+std::string joined(const std::vector<std::string>& reasons) {
+  std::string text;
+  for (const std::string& reason : reasons) text += (text.empty() ? "" : "; ") + reason;
+  return text;
+}
+
 Report report_of(const Sweep& sweep,
                  const std::vector<std::pair<std::string, std::string>>& provenance) {
   const auto front = front_of(sweep);
@@ -172,13 +183,14 @@ Report report_of(const Sweep& sweep,
   report.key_numbers = {{"smallest error", 100.0 * best.error, "%", 2, best.method},
                         {"reference's own error", 100.0 * sweep.floor, "%", 2, "k = 1"},
                         {"settings", static_cast<double>(sweep.points.size()), "1",
-                         static_cast<int>(std::to_string(sweep.points.size()).size()), ""}};
+                         sweep.points.size() < 100 ? 2 : 3, ""}};
   Section trade{"Error against time", {}};
   trade.blocks.push_back(Figure{
       "Error against processor time", as_svg(sweep),
       fmt::format("{}. Down and to the left is better. Below the reference's own error of {:.2g} % "
-                  "nothing can be told apart.",
-                  sweep.error_name, 100.0 * sweep.floor)});
+                  "nothing can be told apart, up to {:.2g} % little.{}",
+                  sweep.error_name, 100.0 * sweep.floor, 100.0 * sweep.resolved,
+                  sweep.left_out.empty() ? "" : " Left out: " + joined(sweep.left_out) + ".")});
   trade.blocks.push_back(table_of(sweep, true));
   report.sections = {std::move(trade), {"All settings", {table_of(sweep, false)}}};
   for (const auto& [name, value] : provenance) report.provenance.push_back({name, value});
@@ -212,16 +224,24 @@ nlohmann::json shared_json(const Sweep& sweep) {
   return {{"title", sweep.title},
           {"error", sweep.error_name},
           {"reference", sweep.reference},
-          {"floor", sweep.floor}};
+          {"floor", sweep.floor},
+          {"resolved", std::max(sweep.floor, sweep.resolved)},
+          {"left_out", sweep.left_out}};
 }
 
-void mark_front(std::vector<SweepPoint>& points, double floor) {
-  const auto known = [floor](const SweepPoint& p) { return std::max(p.error, floor); };
-  for (SweepPoint& p : points)
-    p.on_front = std::none_of(points.begin(), points.end(), [&](const SweepPoint& q) {
-      return q.cpu_s <= p.cpu_s && known(q) <= known(p) &&
-             (q.cpu_s < p.cpu_s || known(q) < known(p));
-    });
+void mark_front(std::vector<SweepPoint>& points, double resolved) {
+  constexpr double kLeastGain = 0.01;
+  std::vector<SweepPoint*> by_time;
+  for (SweepPoint& p : points) by_time.push_back(&p);
+  std::sort(by_time.begin(), by_time.end(), [](const SweepPoint* a, const SweepPoint* b) {
+    return std::tie(a->cpu_s, a->error) < std::tie(b->cpu_s, b->error);
+  });
+  double best = std::numeric_limits<double>::infinity();
+  for (SweepPoint* p : by_time) {
+    const double known = std::max(p->error, resolved);
+    p->on_front = known < (1.0 - kLeastGain) * best;
+    if (p->on_front) best = known;
+  }
 }
 
 Sweep sweep_of(const RunLedger& ledger) {
@@ -231,6 +251,8 @@ Sweep sweep_of(const RunLedger& ledger) {
   shared.at("error").get_to(sweep.error_name);
   shared.at("reference").get_to(sweep.reference);
   shared.at("floor").get_to(sweep.floor);
+  sweep.resolved = shared.value("resolved", sweep.floor);
+  sweep.left_out = shared.value("left_out", sweep.left_out);
   for (std::size_t job = 0; job < ledger.header().jobs.size(); ++job) {
     if (!ledger.has(job)) continue;
     for (const nlohmann::json& j : ledger.result(job)) {
@@ -248,7 +270,7 @@ Sweep sweep_of(const RunLedger& ledger) {
       sweep.points.push_back(std::move(p));
     }
   }
-  mark_front(sweep.points, sweep.floor);
+  mark_front(sweep.points, sweep.resolved);
   return sweep;
 }
 

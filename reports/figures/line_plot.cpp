@@ -19,9 +19,28 @@ constexpr double kWidth = 480, kPlotTop = 28, kPlotBottom = 270, kLeft = 64, kRi
 constexpr double kLegendTop = 328, kLegendRow = 20, kCharacter = 7.8;
 constexpr std::array kColours = {"#0072b2", "#d55e00", "#008a66", "#a4509a", "#9a7400", "#2a9fd6"};
 
-std::string colour(std::size_t series) {
-  const std::size_t i = series % kColours.size();
-  return fmt::format("var(--series-{},{})", i, kColours[i]);
+constexpr std::array kDashes = {"6 5", "2 4", "11 4 2 4"};
+
+// Solid series have colours of their own; laws to compare with are drawn as text is, each in a dash
+// of its own, so that none is taken for a series.
+struct Style {
+  std::string colour, dash;
+};
+
+std::vector<Style> styles_of(const LinePlot& plot) {
+  std::vector<Style> styles;
+  std::size_t solid = 0, dashed = 0;
+  for (const PlotSeries& s : plot.series) {
+    if (s.dashed) {
+      styles.push_back(
+          {"currentColor", fmt::format(" stroke-opacity=\"0.75\" stroke-dasharray=\"{}\"",
+                                       kDashes[dashed++ % kDashes.size()])});
+    } else {
+      const std::size_t i = solid++ % kColours.size();
+      styles.push_back({fmt::format("var(--series-{},{})", i, kColours[i]), ""});
+    }
+  }
+  return styles;
 }
 
 std::string marker(std::size_t series, double x, double y) {
@@ -93,7 +112,7 @@ std::string ribbon(const PlotSeries& s, const AxisScale& x, const AxisScale& y) 
   return "<polygon fill-opacity=\"0.2\" stroke=\"none\" points=\"" + upper + lower + "\"/>";
 }
 
-std::string line(const PlotSeries& s, const AxisScale& x, const AxisScale& y) {
+std::string line(const PlotSeries& s, const Style& style, const AxisScale& x, const AxisScale& y) {
   std::string path;
   bool pen_down = false;
   for (std::size_t i = 0; i < s.x.size(); ++i) {
@@ -103,8 +122,8 @@ std::string line(const PlotSeries& s, const AxisScale& x, const AxisScale& y) {
   }
   if (path.empty()) return "";
   return fmt::format(
-      "<path fill=\"none\" stroke-width=\"2\" stroke-linejoin=\"round\"{} d=\"{}\"/>",
-      s.dashed ? " stroke-dasharray=\"6 5\"" : "", path);
+      "<path fill=\"none\" stroke-width=\"2\" stroke-linejoin=\"round\"{} d=\"{}\"/>", style.dash,
+      path);
 }
 
 std::string bars(const PlotSeries& s, std::size_t i, const AxisScale& x, const AxisScale& y) {
@@ -125,10 +144,11 @@ std::string bars(const PlotSeries& s, std::size_t i, const AxisScale& x, const A
                    px, low, high, px - 3.5);
 }
 
-std::string draw(const PlotSeries& s, std::size_t index, const AxisScale& x, const AxisScale& y) {
-  std::string svg = fmt::format("<g style=\"stroke:{0};fill:{0}\">", colour(index));
+std::string draw(const PlotSeries& s, std::size_t index, const Style& style, const AxisScale& x,
+                 const AxisScale& y) {
+  std::string svg = fmt::format("<g style=\"stroke:{0};fill:{0}\">", style.colour);
   if (s.line && !s.u_y.empty()) svg += ribbon(s, x, y);
-  if (s.line) svg += line(s, x, y);
+  if (s.line) svg += line(s, style, x, y);
   for (std::size_t i = 0; i < s.x.size(); ++i) {
     if (!x.shows(s.x[i]) || !y.shows(s.y[i])) continue;
     svg += bars(s, i, x, y);
@@ -138,7 +158,7 @@ std::string draw(const PlotSeries& s, std::size_t index, const AxisScale& x, con
 }
 
 /// The legend below the plot, wrapped; returns its SVG and the number of its rows.
-std::pair<std::string, int> legend(const LinePlot& plot) {
+std::pair<std::string, int> legend(const LinePlot& plot, const std::vector<Style>& styles) {
   std::string svg;
   double x = kLeft;
   int row = 0;
@@ -150,10 +170,9 @@ std::pair<std::string, int> legend(const LinePlot& plot) {
       ++row;
     }
     const double y = kLegendTop + row * kLegendRow;
-    svg += fmt::format("<g style=\"stroke:{0};fill:{0}\">", colour(i));
+    svg += fmt::format("<g style=\"stroke:{0};fill:{0}\">", styles[i].colour);
     if (s.line)
-      svg += fmt::format("<path stroke-width=\"2\"{} d=\"M{} {}h22\"/>",
-                         s.dashed ? " stroke-dasharray=\"6 5\"" : "", x, y);
+      svg += fmt::format("<path stroke-width=\"2\"{} d=\"M{} {}h22\"/>", styles[i].dash, x, y);
     if (s.markers || !s.line) svg += marker(i, x + 11, y);
     svg +=
         fmt::format("</g><text x=\"{}\" y=\"{}\">{}</text>", x + 28, y + 4.5, xml_escape(s.name));
@@ -168,13 +187,15 @@ std::string to_svg(const LinePlot& plot) {
   for (const auto& s : plot.series) require_equal_lengths(s);
   const AxisScale x(data_range(plot, true), plot.x.logarithmic, kLeft, kRight);
   const AxisScale y(data_range(plot, false), plot.y.logarithmic, kPlotBottom, kPlotTop);
-  const auto [legend_svg, rows] = legend(plot);
+  const std::vector<Style> styles = styles_of(plot);
+  const auto [legend_svg, rows] = legend(plot, styles);
   std::string svg = fmt::format(
       "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" role=\"img\" "
       "font-size=\"14\" fill=\"currentColor\"><title>{}</title>",
       kWidth, kLegendTop + rows * kLegendRow - 8, xml_escape(plot.title));
   svg += axes(plot, x, y);
-  for (std::size_t i = 0; i < plot.series.size(); ++i) svg += draw(plot.series[i], i, x, y);
+  for (std::size_t i = 0; i < plot.series.size(); ++i)
+    svg += draw(plot.series[i], i, styles[i], x, y);
   return svg + legend_svg + "</svg>";
 }
 

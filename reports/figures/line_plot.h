@@ -22,8 +22,8 @@ struct PlotSeries {
 };
 
 /// Lines and points over two axes, linear or logarithmic. The first six series keep apart by
-/// colour, marker and dash alike. Values that are not finite break a line and are left out as
-/// points.
+/// colour, marker and dash alike; dashed ones are drawn as text is. Values that are not finite
+/// break a line and are left out as points.
 struct LinePlot {
   std::string title;  ///< read to those who cannot see the plot
   Axis x;

@@ -18,8 +18,8 @@ struct HierarchyOptions {
   std::string invalid() const;  ///< why these options cannot be used; empty if they can
 };
 
-/// Memory that so many elements take with their tree, points and links, bytes; measured, to a
-/// factor of two. Links of a tolerance grow like its -3/2th power.
+/// Memory that so many elements take with their tree, points and links, bytes; measured, at most
+/// three times too much. Links are taken to grow like 1 / tolerance.
 std::size_t estimated_bytes(std::size_t elements, const HierarchyOptions& options);
 
 /// std::length_error that says what would fit, if the estimate exceeds the memory limit.

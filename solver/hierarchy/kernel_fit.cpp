@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "transport/legendre.h"
+#include "transport/many_targets.h"
 #include "transport/quadrature.h"
 
 namespace truebox {
@@ -61,11 +62,8 @@ Points points_of(const GroupFrame& frame, const Vec3& normal, const Vec3& origin
   return points;
 }
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
-#endif
-void
-project(const Points& a, const Points& b, const Rule& r, float (*coefficient)[kN]) {
+TRUEBOX_MANY_TARGETS void project(const Points& a, const Points& b, const Rule& r,
+                                  float (*coefficient)[kN]) {
   float half[kN][kN] = {};  // points of a x terms of b
   for (int i = 0; i < kN; ++i) {
     float kernel[kN];
@@ -88,16 +86,21 @@ project(const Points& a, const Points& b, const Rule& r, float (*coefficient)[kN
   }
 }
 
-// A grid of 4 x 4 points with the corners in it: polynomials dip there first.
-const Rule& corner_rule() {
-  static const Rule made = [] {
-    Rule r{};
+// The basis at a grid of 4 x 4 points with the corners in it, where polynomials dip first: term x
+// point.
+struct CornerRule {
+  float value[kN][kN];
+};
+
+const CornerRule& corner_rule() {
+  static const CornerRule made = [] {
+    CornerRule r{};
     for (std::size_t k = 0; k < kN; ++k) {
       double of_x[4], of_y[4];
       legendre(static_cast<double>(k % 4) / 3.0, 3, of_x);
       legendre(static_cast<double>(k / 4) / 3.0, 3, of_y);
       for (std::size_t l = 0; l < kN; ++l)
-        r.value[k][l] = static_cast<float>(of_x[kDegreesOfTerm[l][0]] * of_y[kDegreesOfTerm[l][1]]);
+        r.value[l][k] = static_cast<float>(of_x[kDegreesOfTerm[l][0]] * of_y[kDegreesOfTerm[l][1]]);
     }
     return r;
   }();
@@ -105,19 +108,20 @@ const Rule& corner_rule() {
 }
 
 // The lowest value at the points of the rule on either side.
-double lowest(const float (*coefficient)[kN], int terms, const Rule& r) {
-  float least = coefficient[0][0];
+TRUEBOX_MANY_TARGETS float lowest(const float (*coefficient)[kN], int terms, const CornerRule& r) {
+  float least[kN];
+  for (int j = 0; j < kN; ++j) least[j] = coefficient[0][0];
   for (int i = 0; i < kN; ++i) {
-    float of_b[kN] = {};
+    float of_b[kN] = {}, value[kN] = {};
     for (int k = 0; k < terms; ++k)
-      for (int l = 0; l < kN; ++l) of_b[l] += r.value[i][k] * coefficient[k][l];
-    for (int j = 0; j < kN; ++j) {
-      float value = 0.0f;
-      for (int l = 0; l < terms; ++l) value += r.value[j][l] * of_b[l];
-      least = std::min(least, value);
-    }
+      for (int l = 0; l < kN; ++l) of_b[l] += r.value[k][i] * coefficient[k][l];
+    for (int l = 0; l < terms; ++l)
+      for (int j = 0; j < kN; ++j) value[j] += of_b[l] * r.value[l][j];
+    for (int j = 0; j < kN; ++j) least[j] = value[j] < least[j] ? value[j] : least[j];
   }
-  return least;
+  float all = least[0];
+  for (int j = 1; j < kN; ++j) all = std::min(all, least[j]);
+  return all;
 }
 
 constexpr int degree_of(int term) {
@@ -140,7 +144,8 @@ double left_out(const std::array<double, 7>& shell, int kept) {
 
 double KernelFit::damping(int degree) const {
   const double mean = static_cast<double>(coefficient_per_m2[0][0]);
-  const double least = lowest(coefficient_per_m2, terms_of(degree), corner_rule());
+  const auto least =
+      static_cast<double>(lowest(coefficient_per_m2, terms_of(degree), corner_rule()));
   return least < 0.0 ? std::max(0.0, mean / (mean - least)) : 1.0;
 }
 

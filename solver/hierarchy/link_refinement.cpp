@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <deque>
@@ -16,6 +17,7 @@
 
 #include "hierarchy/kernel_fit.h"
 #include "transport/enclosure.h"
+#include "transport/shadow_cones.h"
 
 namespace truebox {
 namespace {
@@ -26,6 +28,7 @@ constexpr int kFirstRays = 8;
 constexpr std::size_t kMostOutlines = 12;  // blockers: beyond, rays are faster
 constexpr double kLeastShadow = 0.03;      // deviation of the visible share where there is an edge
 constexpr double kMissed = 0.2;            // of a partly hidden element, if one point looks
+constexpr double kFarForCentroids = 2.0;   // radii; nearer, Lambert of every part
 constexpr double kFilled = 1e-6;           // of a group's area, that its rectangle may exceed it by
 
 double gap_m(const ElementNode& a, const ElementNode& b) { return a.box.exteriorDistance(b.box); }
@@ -168,19 +171,16 @@ class LinkRefinement::Walk {
     return {share, spread, spread, spread};
   }
 
-  // The outline that a group fills; false if it fills none.
-  bool outline_of(std::uint32_t k, Polygon& outline) const {
-    if (node(k).is_leaf()) {
-      outline = parent_.polygons_[parent_.tree_.order[node(k).begin]].vertices;
-      return true;
-    }
+  // The polygon that a group fills; null if it fills none.
+  const PlanarPolygon* outline_of(std::uint32_t k, std::optional<PlanarPolygon>& made) const {
+    if (node(k).is_leaf()) return &parent_.polygons_[parent_.tree_.order[node(k).begin]];
     const GroupFrame& f = parent_.basis_.frames[k];
     if (!f.is_flat || std::abs(4.0 * f.half_u.norm() * f.half_v.norm() - node(k).area_m2) >
                           kFilled * node(k).area_m2)
-      return false;
-    outline = {f.centre - f.half_u - f.half_v, f.centre + f.half_u - f.half_v,
-               f.centre + f.half_u + f.half_v, f.centre - f.half_u + f.half_v};
-    return true;
+      return nullptr;
+    made.emplace(Polygon{f.centre - f.half_u - f.half_v, f.centre + f.half_u - f.half_v,
+                         f.centre + f.half_u + f.half_v, f.centre - f.half_u + f.half_v});
+    return &*made;
   }
 
   // Gauss points of an element, or of the rectangle that a group fills, with weights.
@@ -206,50 +206,95 @@ class LinkRefinement::Walk {
       for (double t : {-at, at}) points_.push_back({f.centre + s * f.half_u + t * f.half_v, 1.0});
   }
 
+  // The share of the source that a point sees past the solids between.
+  double share_from(const Vec3& x, const Vec3& normal, const PlanarPolygon& source, bool near,
+                    double whole) {
+    std::array<const ShadowCone*, kMostOutlines> across;
+    std::size_t count = 0;
+    std::uint32_t cuts = 0;
+    for (std::uint32_t solid : between_) {
+      ShadowCone& cone = cones_[count];
+      const auto hides =
+          ShadowCone::make(x, normal, parent_.solids_[solid], parent_.culling_.tolerance_m(), cone);
+      if (hides == ShadowCone::Hides::nothing) continue;
+      if (hides == ShadowCone::Hides::all) return 0.0;
+      if (cone.count == 0) return share_past_polygons(x, normal, source);
+      const ShadowTest test = test_shadow(cone, source);
+      if (test.side == ShadowSide::inside) return 0.0;
+      if (test.side == ShadowSide::outside) continue;
+      across[count++] = &cone;
+      cuts = test.cuts;
+    }
+    if (count == 0) return 1.0;
+    const double share =
+        shadow_.visible_share(source, {across.data(), count}, cuts, x, normal, near, whole);
+    return share >= 0.0 ? share : share_past_polygons(x, normal, source);
+  }
+
+  // The same past the polygons that solids are made of, where these are too cornered.
+  double share_past_polygons(const Vec3& x, const Vec3& normal, const PlanarPolygon& source) {
+    std::vector<const Blocker*> polygons;
+    for (std::uint32_t solid : between_)
+      for (std::uint32_t member : parent_.solids_[solid].members)
+        polygons.push_back(&parent_.blockers_[member]);
+    const double whole = point_to_polygon(x, normal, source.vertices);
+    double seen = 0.0;
+    for (const Polygon& part : parts_(x, source.vertices, source.plane, polygons))
+      seen += point_to_polygon(x, normal, part);
+    return whole > 0.0 ? seen / whole : 0.0;
+  }
+
   // What points of one group see of the other's outline: the mean share and its deviation.
-  std::pair<double, double> share_seen(std::uint32_t receiver, std::uint32_t source,
-                                       const Polygon& outline) {
-    const Vec3& normal = node(receiver).normal;
-    const Plane plane{node(source).normal, node(source).normal.dot(outline[0])};
+  std::pair<double, double> share_seen(std::uint32_t receiver, const PlanarPolygon& source,
+                                       double radius_m) {
+    const Vec3 &normal = node(receiver).normal, &at = node(receiver).centre;
+    const double reach = kFarForCentroids * std::max(radius_m, source.radius_m);
+    const double horizon = normal.dot(at) + parent_.culling_.tolerance_m();
+    const bool near = (source.centroid - at).squaredNorm() < reach * reach ||
+                      std::any_of(source.vertices.begin(), source.vertices.end(),
+                                  [&](const Vec3& v) { return normal.dot(v) <= horizon; });
     double seen = 0.0, all = 0.0, squares = 0.0;
     find_points(receiver);
     for (const WeightedPoint& x : points_) {
-      if (plane.distance_m(x.at) <= 0.0) continue;
-      const double whole = point_to_polygon(x.at, normal, outline);
+      if (source.plane.distance_m(x.at) <= 0.0) continue;
+      const Vec3 r = source.centroid - x.at;
+      const double r2 = r.squaredNorm();
+      const double whole = near ? point_to_polygon(x.at, normal, source.vertices)
+                                : normal.dot(r) * -source.plane.normal.dot(r) / (r2 * r2);
       if (whole <= 0.0) continue;
-      double part = 0.0;
-      for (const Polygon& visible : parts_(x.at, outline, plane, between_))
-        part += point_to_polygon(x.at, normal, visible);
-      seen += x.weight * part;
+      const double share = share_from(x.at, normal, source, near, whole);
+      seen += x.weight * whole * share;
       all += x.weight * whole;
-      squares += x.weight * part * part / whole;
+      squares += x.weight * whole * share * share;
     }
     if (all <= 0.0) return {0.0, 0.0};
-    const double share = std::min(1.0, seen / all);
+    const double share = std::clamp(seen / all, 0.0, 1.0);
     return {share, std::sqrt(std::max(0.0, squares / all - share * share))};
   }
 
   // By outlines of the shadows; nothing if there are too many, or no outlines. Elements need one
   // direction only: the smaller one looks.
   std::optional<Visible> outlined_share(Pair pair, std::size_t from) {
-    if (stack_.size() - from > kMostOutlines || !outline_of(pair.a, outline_a_) ||
-        !outline_of(pair.b, outline_b_))
-      return std::nullopt;
     between_.clear();
     for (std::size_t k = from; k < stack_.size(); ++k)
-      between_.push_back(&parent_.blockers_[stack_[k]]);
+      between_.push_back(parent_.solid_of_piece_[stack_[k]]);
+    std::sort(between_.begin(), between_.end());
+    between_.erase(std::unique(between_.begin(), between_.end()), between_.end());
+    if (between_.size() > kMostOutlines) return std::nullopt;
+    const PlanarPolygon *a = outline_of(pair.a, outline_a_), *b = outline_of(pair.b, outline_b_);
+    if (!a || !b) return std::nullopt;
     ++found.counts.outlined;
     if (node(pair.a).is_leaf() && node(pair.b).is_leaf()) {
-      const bool a_looks = node(pair.a).radius_m <= node(pair.b).radius_m;
+      const bool a_looks = a->radius_m <= b->radius_m;
       const auto [share, spread] =
-          a_looks ? share_seen(pair.a, pair.b, outline_b_) : share_seen(pair.b, pair.a, outline_a_);
+          a_looks ? share_seen(pair.a, *b, a->radius_m) : share_seen(pair.b, *a, b->radius_m);
       // One point cannot tell how the share varies; n x n points miss an edge by 1/n of that.
       const double alone = share > 0.0 && share < 1.0 ? kMissed : 0.5 * kMissed;
       const double deviation = order_ == 1 ? alone : spread / order_;
       return Visible{share, deviation, deviation, deviation};
     }
-    const auto [share_a, spread_a] = share_seen(pair.a, pair.b, outline_b_);
-    const auto [share_b, spread_b] = share_seen(pair.b, pair.a, outline_a_);
+    const auto [share_a, spread_a] = share_seen(pair.a, *b, a->radius_m);
+    const auto [share_b, spread_b] = share_seen(pair.b, *a, b->radius_m);
     const double share = 0.5 * (share_a + share_b), doubt = 0.5 * std::abs(share_a - share_b);
     return Visible{share, std::sqrt(share * (1.0 - share)), std::hypot(spread_a, doubt),
                    std::hypot(spread_b, doubt)};
@@ -417,8 +462,10 @@ class LinkRefinement::Walk {
   std::vector<std::uint32_t> stack_;
   std::deque<Pair>* queue_ = nullptr;
   VisibleParts parts_;
-  Polygon outline_a_, outline_b_;
-  std::vector<const Blocker*> between_;
+  ShadowParts shadow_;
+  std::array<ShadowCone, kMostOutlines> cones_;
+  std::optional<PlanarPolygon> outline_a_, outline_b_;
+  std::vector<std::uint32_t> between_;  // solids
   std::vector<WeightedPoint> points_;
   PatchPointBuffer of_element_;
   int order_ = 3;  // of the Gauss points of elements
@@ -465,6 +512,20 @@ LinkRefinement::LinkRefinement(const PatchMesh& mesh, const Visibility& visibili
       polygons_(planar_polygons(mesh)),
       kernel_(polygons_, basis.tree.order, kernel_tolerance, kOneSide * diameter_m(mesh)) {
   for (const Piece& piece : mesh.pieces) blockers_.push_back({piece.polygon, piece.plane});
+  find_solids();
+}
+
+// Pieces that cannot block stay out: an opening would close a block's side.
+void LinkRefinement::find_solids() {
+  std::vector<Blocker> polygons;
+  for (std::uint32_t piece : culling_.blockers()) polygons.push_back(blockers_[piece]);
+  solids_ = convex_occluders(polygons, culling_.tolerance_m());
+  solid_of_piece_.resize(blockers_.size());
+  for (std::uint32_t k = 0; k < solids_.size(); ++k)
+    for (std::uint32_t& member : solids_[k].members) {
+      member = culling_.blockers()[member];
+      solid_of_piece_[member] = k;
+    }
 }
 
 Links LinkRefinement::refine(const NodeLight& light, const LinkOptions& options,

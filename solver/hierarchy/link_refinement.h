@@ -8,6 +8,7 @@
 #include "hierarchy/group_basis.h"
 #include "hierarchy/group_samples.h"
 #include "radiometry/progress.h"
+#include "transport/convex_occluder.h"
 #include "transport/found_exchange.h"
 #include "transport/pair_kernel.h"
 
@@ -76,11 +77,11 @@ struct Links {
 /// that will do. Shafts drop groups that one blocker hides, and leave the few blockers that may
 /// hide a part: the visible share of a rectangle or an element is that of exact outlines from
 /// points of the other: 2 x 2 of groups, both ways; of elements 3 x 3, fewer where they matter
-/// little. Where blockers are many or groups no rectangles, rays between their points give it.
-/// Elements take the accurate kernel times their visible share. std::length_error if they take more
-/// than most_bytes. Sources: Hanrahan, Salzman & Aupperle (1991); Gortler, Schroeder, Cohen &
-/// Hanrahan (1993), higher degrees; Lischinski, Smits & Greenberg (1994), error of a link; Haines &
-/// Wallace (1994), shafts.
+/// little. Faces of one convex block hide together. Where blockers are many or groups no
+/// rectangles, rays between their points give it. Elements take the accurate kernel times their
+/// visible share. std::length_error if they take more than most_bytes. Sources: Hanrahan, Salzman &
+/// Aupperle (1991); Gortler, Schroeder, Cohen & Hanrahan (1993), higher degrees; Lischinski, Smits
+/// & Greenberg (1994), error of a link; Haines & Wallace (1994), shafts.
 class LinkRefinement {
  public:
   /// All must outlive this. `kernel_tolerance` is relative, of a pair of elements.
@@ -94,6 +95,7 @@ class LinkRefinement {
 
  private:
   class Walk;
+  void find_solids();
   struct Pair {
     std::uint32_t a, b;
   };
@@ -106,6 +108,8 @@ class LinkRefinement {
   std::vector<PlanarPolygon> polygons_;
   PairKernel kernel_;
   std::vector<Blocker> blockers_;  // one a piece
+  std::vector<ConvexOccluder> solids_;
+  std::vector<std::uint32_t> solid_of_piece_;  // of pieces that can block
 };
 
 }  // namespace truebox

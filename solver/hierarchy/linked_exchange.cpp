@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "transport/many_targets.h"
+
 namespace truebox {
 namespace {
 
@@ -29,35 +31,50 @@ std::vector<std::size_t> starts(const std::vector<AnyLink>& links, std::size_t n
   return {first.begin(), first.end() - 1};
 }
 
-// out += C in: n x n coefficients, `across` from one row to the next, Width numbers a term.
+// out += C in, or its transpose: n x n coefficients, those of a row next to each other, Width
+// numbers a term.
 template <int Width>
-[[gnu::always_inline]] inline void add_coupled_terms(const float* c, int n, int across, int along,
+[[gnu::always_inline]] inline void add_coupled_terms(const float* c, int n, bool is_mirrored,
                                                      const double* in, double* out) {
   for (int k = 0; k < n; ++k) {
-    double sum[Width] = {};
-    for (int m = 0; m < n; ++m) {
-      const double coefficient = static_cast<double>(c[k * across + m * along]);
-      for (int b = 0; b < Width; ++b) sum[b] += coefficient * in[m * Width + b];
+    const float* const row = c + k * n;
+    if (is_mirrored) {
+      for (int m = 0; m < n; ++m)
+        for (int b = 0; b < Width; ++b)
+          out[m * Width + b] += static_cast<double>(row[m]) * in[k * Width + b];
+    } else {
+      double sum[Width] = {};
+      for (int m = 0; m < n; ++m)
+        for (int b = 0; b < Width; ++b) sum[b] += static_cast<double>(row[m]) * in[m * Width + b];
+      for (int b = 0; b < Width; ++b) out[k * Width + b] += sum[b];
     }
-    for (int b = 0; b < Width; ++b) out[k * Width + b] += sum[b];
   }
 }
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
-#endif
-void
-add_coupled_terms_of_eight(const float* c, int n, int across, int along, const double* in,
-                           double* out) {
-  add_coupled_terms<8>(c, n, across, along, in, out);
+// Clones are made of functions, not of templates.
+TRUEBOX_MANY_TARGETS void add_one(const float* c, int n, bool is_mirrored, const double* in,
+                                  double* out) {
+  add_coupled_terms<1>(c, n, is_mirrored, in, out);
+}
+TRUEBOX_MANY_TARGETS void add_four(const float* c, int n, bool is_mirrored, const double* in,
+                                   double* out) {
+  add_coupled_terms<4>(c, n, is_mirrored, in, out);
+}
+TRUEBOX_MANY_TARGETS void add_eight(const float* c, int n, bool is_mirrored, const double* in,
+                                    double* out) {
+  add_coupled_terms<8>(c, n, is_mirrored, in, out);
 }
 
 template <int Width>
-void add_coupled(const float* c, int n, int across, int along, const double* in, double* out) {
-  if constexpr (Width == 8)
-    add_coupled_terms_of_eight(c, n, across, along, in, out);
+void add_coupled(const float* c, int n, bool is_mirrored, const double* in, double* out) {
+  if constexpr (Width == 1)
+    add_one(c, n, is_mirrored, in, out);
+  else if constexpr (Width == 4)
+    add_four(c, n, is_mirrored, in, out);
+  else if constexpr (Width == 8)
+    add_eight(c, n, is_mirrored, in, out);
   else
-    add_coupled_terms<Width>(c, n, across, along, in, out);
+    add_coupled_terms<Width>(c, n, is_mirrored, in, out);
 }
 
 }  // namespace
@@ -122,8 +139,8 @@ class LinkedExchange::Product {
     for (std::size_t l = of_.first_polynomial_[node]; l < of_.first_polynomial_[node + 1]; ++l) {
       const HalfPolynomial& half = of_.half_polynomial_[l];
       const int n = terms_of(half.degree);
-      add_coupled<Width>(of_.coefficients_per_m2_.data() + half.first, n, half.is_mirrored ? 1 : n,
-                         half.is_mirrored ? n : 1, at(sent_, half.source), out);
+      add_coupled<Width>(of_.coefficients_per_m2_.data() + half.first, n, half.is_mirrored != 0,
+                         at(sent_, half.source), out);
     }
   }
 
@@ -175,7 +192,7 @@ LinkedExchange::LinkedExchange(std::shared_ptr<const GroupBasis> groups, Eigen::
     half_polynomial_[next[link.b]++] = {link.a, degree, 1, link.first};
     degree_ = std::max(degree_, static_cast<int>(link.degree));
   }
-  set_row_sum_max();
+  row_sum_max_ = row_sums().maxCoeff();
 }
 
 BandMatrix LinkedExchange::product(const BandMatrix& x) const {
@@ -256,8 +273,6 @@ Eigen::VectorXd LinkedExchange::row_sums() const {
   return product(BandMatrix::Ones(area_m2_.size(), 1)).col(0).cwiseQuotient(area_m2_);
 }
 
-void LinkedExchange::set_row_sum_max() { row_sum_max_ = row_sums().maxCoeff(); }
-
 LinkedExchange::Repair LinkedExchange::close_rows(double least_row, bool closed, double accuracy) {
   const Eigen::VectorXd before = scale_;
   const Eigen::VectorXd unscaled = row_sums();
@@ -287,7 +302,7 @@ LinkedExchange::Repair LinkedExchange::close_rows(double least_row, bool closed,
     if (scale_[i] > 0.0)
       repair.residual_max =
           std::max(repair.residual_max, closed ? std::abs(after[i] - 1.0) : after[i] - 1.0);
-  set_row_sum_max();
+  row_sum_max_ = after.maxCoeff();
   return repair;
 }
 

@@ -55,7 +55,6 @@ class LinkedExchange final : public ExchangeOperator {
   template <int Width>
   class Product;
 
-  void set_row_sum_max();
   void spread_to_elements(std::size_t node, const std::vector<double>& of_node,
                           Eigen::Ref<Eigen::VectorXd> values) const;
 

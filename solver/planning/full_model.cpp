@@ -8,11 +8,13 @@
 #include <atomic>
 #include <cmath>
 
+#include "hierarchy/hierarchical_exchange.h"
 #include "radiometry/processor_time.h"
 #include "transport/closure_repair.h"
 #include "transport/direct_light.h"
 #include "transport/enclosure.h"
 #include "transport/form_factor.h"
+#include "transport/polynomial_means.h"
 
 namespace truebox {
 namespace {
@@ -22,6 +24,8 @@ using Eigen::Index;
 constexpr unsigned kRays = 16;
 constexpr double kKernelTolerance = 1e-5;
 constexpr double kRounding = 1e-12;
+constexpr std::size_t kLeastConstants = 2400;
+constexpr double kLinksAtMost = 3.0;  // of their estimate, as in bounds
 
 struct Element {
   PlanarPolygon polygon;
@@ -168,6 +172,35 @@ double brightest_reflectance(const Scene& scene) {
   return rho;
 }
 
+// Mean irradiance, surfaces x bands.
+BandMatrix means_of_surfaces(const Prediction& prediction) {
+  const GridSolution& grid = prediction.fine();
+  const BandMatrix irradiance = prediction.irradiance();
+  BandMatrix sum =
+      BandMatrix::Zero(static_cast<Index>(prediction.scene().surfaces.size()), irradiance.cols());
+  Eigen::VectorXd area_m2 = Eigen::VectorXd::Zero(sum.rows());
+  for (std::size_t i = 0; i < grid.mesh.size(); ++i) {
+    const auto s = static_cast<Index>(grid.mesh.surface_of(grid.mesh.patches[i]));
+    const double free_m2 = grid.free_area_m2[static_cast<Index>(i)];
+    sum.row(s) += free_m2 * irradiance.row(static_cast<Index>(i));
+    area_m2[s] += free_m2;
+  }
+  return area_m2.cwiseMax(1e-300).cwiseInverse().asDiagonal() * sum;
+}
+
+// Root mean square over the area, relative to the mean; the worst band.
+double rms_difference(const Prediction& a, const Prediction& b) {
+  const BandMatrix of_a = a.irradiance(), of_b = b.irradiance();
+  const Eigen::VectorXd& area_m2 = b.fine().free_area_m2;
+  double worst = 0.0;
+  for (Index k = 0; k < of_b.cols(); ++k)
+    if (const double mean = area_m2.dot(of_b.col(k)) / area_m2.sum(); mean > 0.0)
+      worst = std::max(
+          worst,
+          std::sqrt(area_m2.dot((of_a.col(k) - of_b.col(k)).cwiseAbs2()) / area_m2.sum()) / mean);
+  return worst;
+}
+
 class Checks {
  public:
   Checks(const Scene& scene, const Plan& plan, std::size_t elements)
@@ -175,6 +208,71 @@ class Checks {
         mesh_(uniform_mesh(scene, edge_for_count(scene, elements))),
         needed_(needed_model(plan)),
         planned_(solve_model(scene, mesh_, needed_)) {}
+
+  // Means by polynomials against those of constants on three grids: the mean and band whose
+  // difference comes nearest to what both bounds together allow.
+  void hold_polynomials(const Plan& plan, double target, std::size_t elements) {
+    ClaimCheck check;
+    check.claim = "polynomials, not constants";
+    check.work = "unknowns";
+    PolynomialOptions few;
+    few.degree = plan.degree;
+    few.elements = plan.elements;
+    few.kernel_tolerance = kernel_tolerance_for(target);
+    double start = process_cpu_s();
+    const PolynomialMeans means = polynomial_means(scene_, few);
+    check.planned_s = process_cpu_s() - start;
+    PredictOptions many;
+    many.elements = std::max(elements, kLeastConstants);
+    start = process_cpu_s();
+    const Prediction constants(scene_, many);
+    check.full_s = process_cpu_s() - start;
+    check.planned_work = static_cast<double>(means.unknowns);
+    check.full_work = static_cast<double>(constants.fine().mesh.size());
+    check.allowed_why = "both bounds";
+    const BandMatrix of_constants = means_of_surfaces(constants);
+    const BandMatrix bound = constants.surface_irradiance_bound() + means.irradiance_bound;
+    double worst = -1.0;
+    for (Index s = 0; s < bound.rows(); ++s)
+      for (Index k = 0; k < bound.cols(); ++k) {
+        if (!(means.irradiance(s, k) > 0.0)) continue;
+        const double off = std::abs(means.irradiance(s, k) - of_constants(s, k));
+        if (off / bound(s, k) <= worst) continue;
+        worst = off / bound(s, k);
+        check.difference = off / of_constants(s, k);
+        check.allowed = bound(s, k) / of_constants(s, k);
+      }
+    checks_.push_back(std::move(check));
+  }
+
+  // Irradiance by links against that of the matrix, rms over the area relative to the mean.
+  void hold_links(double tolerance) {
+    PredictOptions options;
+    // The finest grid alone counts.
+    options.mesh_of_grid = [this](int grid) {
+      return grid < 2 ? uniform_mesh(scene_, scene_.diameter_m()) : mesh_;
+    };
+    options.near_sources = false;
+    const auto solve = [&](double& processor_s) {
+      const double start = process_cpu_s();
+      auto prediction = std::make_unique<Prediction>(scene_, options);
+      processor_s = process_cpu_s() - start;
+      return prediction;
+    };
+    ClaimCheck check;
+    check.claim = "links instead of a matrix";
+    check.work = "numbers";
+    const auto matrix = solve(check.full_s);
+    options.find_exchange = hierarchical_exchange({.relative_tolerance = tolerance});
+    const auto links = solve(check.planned_s);
+    const auto n = static_cast<double>(mesh_.size());
+    check.full_work = 0.5 * n * n;
+    check.planned_work = static_cast<double>(links->fine().links->links);
+    check.difference = rms_difference(*links, *matrix);
+    check.allowed = kLinksAtMost * tolerance;
+    check.allowed_why = "three times the tolerance, which is an estimate";
+    checks_.push_back(std::move(check));
+  }
 
   // The planned answer against that of `model`, which makes one claim less.
   void hold(const std::string& claim, const Model& model, const char* work,
@@ -269,6 +367,8 @@ std::vector<ClaimCheck> check_claims(const Scene& scene, const Plan& plan, std::
     checks.hold("solver stops early", model, "passes", passes_of, plan.solver_bound + 1e-13,
                 "the solver's bound");
   }
+  if (plan.degree > 0) checks.hold_polynomials(plan, plan.target_error, elements);
+  if (plan.exchange == PlannedExchange::hierarchical) checks.hold_links(plan.link_tolerance);
   if (!plan.needs.occlusion) {
     const bool exact = !plan.needs.interreflection;
     checks.hold("all of it", full_model(), "rays", rays_of, exact ? kRounding : kernel + stop,

@@ -39,8 +39,10 @@ struct ClaimCheck {
   std::string work;  ///< what is counted
   double planned_work = 0.0, full_work = 0.0;
   double planned_s = 0.0, full_s = 0.0;  ///< processor time
-  double difference = 0.0;  ///< largest of an element and band, relative to that band's largest
-  double allowed = 0.0;     ///< what the plan says it can cause, at most
+  /// Largest of an element and band, relative to that band's largest; of links rms over the area,
+  /// relative to the mean.
+  double difference = 0.0;
+  double allowed = 0.0;  ///< what the plan says it can cause, at most
   std::string allowed_why;
 
   bool holds() const { return difference <= allowed; }

@@ -6,6 +6,7 @@
 
 #include "adaptive/adaptive_solution.h"
 #include "path_tracer/path_tracer.h"
+#include "planning/field_error.h"
 #include "radiometry/processor_time.h"
 #include "sensor/camera.h"
 #include "transport/predict_to_target.h"
@@ -15,7 +16,10 @@ namespace {
 
 constexpr double kReserve = 1.15;        // as predict_to_target takes
 constexpr double kBoundOrder = 3.0 / 4;  // the bound falls like elements^-this
-constexpr double kSmaller = 1.0 / 3.0;   // of the solve that the cost's growth is taken from
+// And the rms error of the field: measured, solver/README.md.
+constexpr double kFieldOrder = 0.6, kAdaptedFieldOrder = 1.0;
+constexpr double kLeastCostExponent = 1.6;  // measured from 2400 to 10,000 elements
+constexpr double kSmaller = 1.0 / 3.0;      // of the solve that the cost's growth is taken from
 
 // How much of the light comes by reflection, in the band where that is most.
 double indirect_share(const Prediction& prediction) {
@@ -33,17 +37,32 @@ double indirect_share(const Prediction& prediction) {
   return largest;
 }
 
-}  // namespace
-
-double Pilot::elements_for(double bound) const {
-  if (relative_bound <= bound) return static_cast<double>(elements);
-  return kReserve * static_cast<double>(elements) *
-         std::pow(relative_bound / bound, 1.0 / kBoundOrder);
+std::unique_ptr<Prediction> timed_solve(const Scene& scene, PredictOptions options,
+                                        const std::optional<Goal>& adapted_to,
+                                        double& processor_s) {
+  options.error_shares = false;
+  const double start = process_cpu_s();
+  auto prediction = adapted_to ? predict_adaptively(scene, options, *adapted_to)
+                               : std::make_unique<Prediction>(scene, options);
+  processor_s = process_cpu_s() - start;
+  return prediction;
 }
 
-double Pilot::bound_for(double wanted_elements) const {
-  return relative_bound *
-         std::pow(kReserve * static_cast<double>(elements) / wanted_elements, kBoundOrder);
+}  // namespace
+
+double Pilot::error() const {
+  return measure == ErrorMeasure::rms_irradiance ? field_error : relative_bound;
+}
+
+double Pilot::elements_for(double wanted_error) const {
+  if (error() <= wanted_error) return static_cast<double>(elements);
+  return kReserve * static_cast<double>(elements) *
+         std::pow(error() / wanted_error, 1.0 / error_order);
+}
+
+double Pilot::error_for(double wanted_elements) const {
+  return error() *
+         std::pow(kReserve * static_cast<double>(elements) / wanted_elements, error_order);
 }
 
 double Pilot::processor_s_for(double wanted_elements) const {
@@ -51,18 +70,17 @@ double Pilot::processor_s_for(double wanted_elements) const {
 }
 
 Pilot fly_pilot(const Scene& scene, const PredictOptions& options,
-                const std::optional<Goal>& adapted_to) {
+                const std::optional<Goal>& adapted_to, ErrorMeasure measure) {
   const auto solve = [&](std::size_t elements, double& processor_s) {
     PredictOptions attempt = options;
     attempt.elements = elements;
-    attempt.error_shares = false;
-    const double start = process_cpu_s();
-    auto prediction = adapted_to ? predict_adaptively(scene, attempt, *adapted_to)
-                                 : std::make_unique<Prediction>(scene, attempt);
-    processor_s = process_cpu_s() - start;
-    return prediction;
+    return timed_solve(scene, attempt, adapted_to, processor_s);
   };
   Pilot pilot;
+  pilot.measure = measure;
+  pilot.error_order = measure == ErrorMeasure::bound_of_means ? kBoundOrder
+                      : adapted_to                            ? kAdaptedFieldOrder
+                                                              : kFieldOrder;
   double small_s = 0.0;
   const auto smaller =
       solve(static_cast<std::size_t>(kSmaller * static_cast<double>(options.elements)), small_s);
@@ -71,15 +89,22 @@ Pilot fly_pilot(const Scene& scene, const PredictOptions& options,
   pilot.elements = grid.mesh.size();
   const double growth =
       static_cast<double>(pilot.elements) / static_cast<double>(smaller->fine().mesh.size());
-  // Between what direct light costs and what a matrix does; two alike tell nothing.
+  // What grows with the pairs overtakes the rest beyond the pilot; two sizes alike tell nothing.
   if (growth > 1.5 && small_s > 0.0)
-    pilot.cost_exponent =
-        std::clamp(std::log(pilot.processor_s / small_s) / std::log(growth), 1.0, 2.0);
+    pilot.cost_exponent = std::clamp(std::log(pilot.processor_s / small_s) / std::log(growth),
+                                     kLeastCostExponent, 2.0);
   pilot.relative_bound = largest_relative_bound(*prediction);
+  if (measure == ErrorMeasure::rms_irradiance) pilot.field_error = field_error(*prediction);
   pilot.indirect_share = indirect_share(*prediction);
   pilot.form_factors = grid.form_factors;
   pilot.matrix_passes = grid.solve.matrix_passes;
   pilot.bands_reduced = grid.solve.bands_reduced;
+  return pilot;
+}
+
+Pilot fly_single_pilot(const Scene& scene, const PredictOptions& options) {
+  Pilot pilot;
+  pilot.elements = timed_solve(scene, options, std::nullopt, pilot.processor_s)->fine().mesh.size();
   return pilot;
 }
 

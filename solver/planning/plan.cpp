@@ -31,6 +31,8 @@ double facing_pairs(const Pilot& pilot) {
 
 Plan Planner::make() {
   plan_.needs = requirements(scene_);
+  plan_.measure = request_.measure;
+  plan_.target_error = request_.target_error;
   MutualVisibility visibility(scene_);
   plan_.sight = visibility.shares();
   if (visibility.is_complete()) plan_.visibility = std::move(visibility);
@@ -48,7 +50,8 @@ void Planner::plan_paths() {
   plan_.method = PlannedMethod::path_tracing;
   plan_.exchange = PlannedExchange::none;
   plan_.bands_solved = scene_.bands.size();
-  Decision d{"method", "path tracing", plan_.needs.reasons.front()};
+  const std::string& reason = plan_.needs.reasons.front();  // "path tracing: needed, surface ..."
+  Decision d{"method", "path tracing", reason.substr(reason.find(", ") + 2)};
   d.left_out = "nothing; form factors cannot describe such a surface";
   d.error_kind = ErrorKind::noise;
   d.error = request_.target_error;
@@ -88,10 +91,12 @@ void Planner::plan_radiosity() {
   plan_.form_factors = FormFactorMethod::exact_visibility;
   if (kGridsOfAPiece * pieces() <= kLargestPilot) fly(std::nullopt);
   decide_method();
-  decide_mesh();
-  decide_lines();
-  decide_basis();
-  decide_exchange();
+  if (!choose_polynomials()) {
+    decide_mesh();
+    decide_lines();
+    decide_basis();
+    decide_exchange();
+  }
   const Pilot* pilot = plan_.pilot ? &*plan_.pilot : nullptr;
   decide_occlusion(pilot ? static_cast<double>(pilot->form_factors.pairs_sampled) : 0.0,
                    pilot ? facing_pairs(*pilot) : 0.0);
@@ -116,7 +121,7 @@ PredictOptions Planner::pilot_options() const {
 }
 
 void Planner::fly(const std::optional<Goal>& goal) {
-  plan_.pilot = fly_pilot(scene_, pilot_options(), goal);
+  plan_.pilot = fly_pilot(scene_, pilot_options(), goal, request_.measure);
 }
 
 void Planner::decide_method() {

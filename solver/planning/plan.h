@@ -12,14 +12,15 @@
 namespace truebox {
 
 struct PlanRequest {
-  /// Bound of every surface's mean irradiance, or standard error of a pixel where paths are traced;
-  /// a share.
+  /// A share: of what `measure` says, or standard error of a pixel where paths are traced.
   double target_error = 0.01;
+  ErrorMeasure measure = ErrorMeasure::bound_of_means;
   /// What counts: nothing for all surfaces alike, else what the mesh is refined for.
   std::optional<Goal> goal;
   std::optional<CameraDescription> camera;  ///< whose picture is wanted
   /// Values are interpolated between corners of elements, as viewers of .vtu and .glb do.
   bool interpolated = false;
+  bool means_only = false;  ///< of surfaces: no values at points are wanted
   std::size_t memory_limit_bytes = std::size_t{8} << 30;
   Progress progress;
 
@@ -61,11 +62,14 @@ struct Plan {
   std::optional<Pilot> pilot;                  ///< none for scenes too large for one
   std::optional<PathPilot> path_pilot;
 
+  double target_error = 0.0;                            ///< as requested,
+  ErrorMeasure measure = ErrorMeasure::bound_of_means;  ///< as this
   PlannedMethod method = PlannedMethod::radiosity;
   PlannedMesh mesh = PlannedMesh::uniform;
   PlannedExchange exchange = PlannedExchange::full_matrix;
   FormFactorMethod form_factors = FormFactorMethod::ray_casting;
   bool discontinuities = false;  ///< elements follow lines of light
+  int degree = 0;                ///< of polynomials on an element; 0: constants
   std::size_t elements = 0;
   double solver_bound = 1e-7;
   double link_tolerance = 0.0;   ///< hierarchical

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What elements, and what is kept between them.
+// What elements.
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "hierarchy/hierarchical_exchange.h"
 #include "planning/line_pilot.h"
 #include "planning/plan_text.h"
 #include "planning/planner.h"
@@ -12,14 +11,12 @@
 namespace truebox {
 
 using plan_text::count;
-using plan_text::mebibytes;
 using plan_text::percent;
 using plan_text::seconds;
 
 namespace {
 
 constexpr double kAdaptingPaysFrom = 1500.0;  // elements; measured, solver/README.md
-constexpr double kCoarseLinks = 0.1, kFineLinks = 1e-2;
 constexpr double kStreamedMatrices =
     40.0;  // what passes over rows made anew take; solver/README.md
 constexpr double kStreamingPatience_s = 600.0;  // of processor time; longer, and links are better
@@ -54,13 +51,13 @@ void Planner::adapt_if_it_pays(const Pilot& uniform, MeshChoice& choice) {
       std::max(plan_.pilot->elements_for(request_.target_error), least_elements());
   const double adapted_s = plan_.pilot->processor_s_for(adapted);
   const double uniform_s = uniform.processor_s_for(choice.uniform_elements);
-  choice.why += "; adapted: " + percent(plan_.pilot->relative_bound) + " with " +
+  choice.why += "; adapted: " + percent(plan_.pilot->error()) + " with " +
                 count(plan_.pilot->elements) + " elements, so " + count(adapted) +
                 " foretold and " + seconds(adapted_s) + " instead of " +
                 count(choice.uniform_elements) + " and " + seconds(uniform_s);
   const bool alone_fits =
       choice.uniform_elements > elements_that_fit() && adapted <= elements_that_fit();
-  if (request_.goal || adapted_s < uniform_s || alone_fits) {
+  if ((request_.goal && !is_rms()) || adapted_s < uniform_s || alone_fits) {
     plan_.mesh = PlannedMesh::adapted;
     choice.elements = adapted;
   } else {
@@ -77,8 +74,8 @@ void Planner::fit_memory(const Pilot& uniform, MeshChoice& choice) {
     plan_.pilot = uniform;
     choice.elements = choice.uniform_elements;
   } else if (choice.elements > fits && fits > least_elements() &&
-             plan_.pilot->bound_for(fits) < kLinksBound * request_.target_error) {
-    choice.error = plan_.pilot->bound_for(fits);
+             plan_.pilot->error_for(fits) < kLinksBound * request_.target_error) {
+    choice.error = plan_.pilot->error_for(fits);
     choice.why += "; " + count(choice.elements) + " do not fit the memory, " + count(fits) +
                   " do and are not foretold to meet the target";
     choice.elements = fits;
@@ -94,13 +91,14 @@ void Planner::decide_mesh() {
   MeshChoice choice;
   choice.uniform_elements = choice.elements =
       std::max(uniform.elements_for(request_.target_error), least_elements());
-  choice.why = "the pilot's bound of " + percent(uniform.relative_bound) + " with " +
-               count(uniform.elements) + " elements falls like elements^(-3/4)";
+  choice.why = std::string("the pilot's ") + (is_rms() ? "rms error" : "bound") + " of " +
+               percent(uniform.error()) + " with " + count(uniform.elements) +
+               " elements falls like elements^(" + (is_rms() ? "-0.6" : "-3/4") + ")";
   adapt_if_it_pays(uniform, choice);
   choice.error = choice.elements > least_elements()
                      ? request_.target_error
-                     : std::min(request_.target_error, plan_.pilot->bound_for(choice.elements));
-  fit_memory(uniform, choice);
+                     : std::min(request_.target_error, plan_.pilot->error_for(choice.elements));
+  if (!is_rms() || !link_if_it_pays(uniform, choice)) fit_memory(uniform, choice);
   plan_.elements = static_cast<std::size_t>(std::min(choice.elements, 1e9));
   const bool is_adapted = plan_.mesh == PlannedMesh::adapted;
   Decision d{"mesh", (is_adapted ? "adapted, " : "uniform, ") + count(plan_.elements) + " elements",
@@ -109,9 +107,9 @@ void Planner::decide_mesh() {
   d.work = "elements";
   d.planned_work = choice.elements;
   d.full_work = choice.uniform_elements;
-  d.error_kind = ErrorKind::bound;
+  d.error_kind = is_rms() ? ErrorKind::estimate : ErrorKind::bound;
   d.error = mesh_error_ = choice.error;
-  d.error_of = "mean irradiance of a surface";
+  d.error_of = error_name();
   add(std::move(d));
 }
 
@@ -119,7 +117,9 @@ void Planner::decide_mesh() {
 // assumed, because few elements have no room for many lines.
 void Planner::decide_lines() {
   if (!plan_.needs.occlusion) return;
-  Decision d{"lines of light", "not followed", ""};
+  Decision d;
+  d.topic = "lines of light";
+  d.choice = "not followed";
   d.left_out = "elements along outlines of shadows (--discontinuities)";
   d.error_of = "irradiance interpolated between corners, rms over the area";
   if (!request_.interpolated) {
@@ -152,72 +152,6 @@ void Planner::decide_lines() {
   d.error_of = "direct light interpolated between corners, rms over the area, with " +
                count(pilot.elements) + " elements";
   add(std::move(d));
-}
-
-// Measured orders: tests/verification/basis_convergence_test.cpp.
-void Planner::decide_basis() {
-  Decision d{"basis", "constants, and a continuous field of quadratics between them", ""};
-  d.why = plan_.needs.occlusion
-              ? "light has kinks at shadows, where a higher degree gains nothing on elements that "
-                "do not follow them"
-              : "edges where surfaces meet leave every degree of first order on even elements; "
-                "means, which are bound here, converge twice as fast";
-  d.left_out = "polynomials of degree 1 to 4 (solve --basis, where nothing is hidden)";
-  d.error_kind = ErrorKind::bound;
-  d.error = plan_.pilot ? mesh_error_ : std::numeric_limits<double>::quiet_NaN();
-  d.error_of = "mean irradiance of a surface, together with the mesh";
-  add(std::move(d));
-}
-
-void Planner::decide_exchange() {
-  const double n = static_cast<double>(plan_.elements);
-  const double matrix_bytes = n * n * sizeof(double);
-  Decision d{"exchange", "", ""};
-  d.work = "MiB";
-  d.full_work = matrix_bytes / (1 << 20);
-  if (matrix_bytes <= static_cast<double>(request_.memory_limit_bytes)) {
-    plan_.bytes = static_cast<std::size_t>(matrix_bytes);
-    d.choice = "full matrix, " + mebibytes(matrix_bytes);
-    d.why = "fits the limit of " + mebibytes(static_cast<double>(request_.memory_limit_bytes)) +
-            ", and its bound is one; that of links is an estimate";
-    d.planned_work = d.full_work;
-  } else if (plan_.exchange == PlannedExchange::streamed) {
-    plan_.bytes = static_cast<std::size_t>(3.0 * n * sizeof(double) *
-                                           static_cast<double>(scene_.bands.size()));
-    d.choice = "streamed: rows made anew for each pass, about " +
-               mebibytes(static_cast<double>(plan_.bytes));
-    d.why = "a matrix takes " + mebibytes(matrix_bytes) + ", above the limit of " +
-            mebibytes(static_cast<double>(request_.memory_limit_bytes)) +
-            "; without it the passes take " + seconds(plan_.processor_s) +
-            ", and the bound stays one";
-    d.left_out = "the matrix";
-    d.planned_work = static_cast<double>(plan_.bytes) / (1 << 20);
-  } else {
-    exchange_by_links(matrix_bytes, d);
-  }
-  add(std::move(d));
-}
-
-void Planner::exchange_by_links(double matrix_bytes, Decision& d) {
-  plan_.exchange = PlannedExchange::hierarchical;
-  plan_.mesh = PlannedMesh::uniform;
-  // Without a pilot nobody knows what finer links are worth beside the grid's own error.
-  plan_.link_tolerance =
-      plan_.pilot ? std::clamp(request_.target_error, kFineLinks, kCoarseLinks) : kCoarseLinks;
-  HierarchyOptions options{plan_.link_tolerance, request_.memory_limit_bytes};
-  if (estimated_bytes(plan_.elements, options) > request_.memory_limit_bytes)
-    plan_.link_tolerance = options.relative_tolerance = kCoarseLinks;
-  plan_.bytes = estimated_bytes(plan_.elements, options);
-  d.choice = "hierarchical, links of " + percent(plan_.link_tolerance) + ", about " +
-             mebibytes(static_cast<double>(plan_.bytes));
-  d.why = "a matrix takes " + mebibytes(matrix_bytes) + ", above the limit of " +
-          mebibytes(static_cast<double>(request_.memory_limit_bytes));
-  d.left_out = "what is too faint to be worth a link of its own";
-  d.planned_work = static_cast<double>(plan_.bytes) / (1 << 20);
-  d.error_kind = ErrorKind::estimate;
-  d.error = plan_.link_tolerance;
-  d.error_of = "irradiance, rms over the area";
-  plan_.processor_s = 0.0;  // the pilot's law is that of a matrix
 }
 
 }  // namespace truebox

@@ -2,6 +2,7 @@
 // What is worked out between elements, and how the system is solved.
 #include "planning/plan_text.h"
 #include "planning/planner.h"
+#include "transport/polynomial_means.h"
 
 namespace truebox {
 
@@ -46,7 +47,11 @@ void Planner::decide_form_factors() {
   d.error_kind = ErrorKind::bound;
   d.error = 1e-5;
   d.error_of = "a form factor";
-  if (plan_.exchange == PlannedExchange::hierarchical) {
+  if (plan_.degree > 0) {
+    d.choice = "moments of the kernel between polynomials";
+    d.error = kernel_tolerance_for(request_.target_error);
+    d.error_of = "a moment; the bound of the means holds what that does";
+  } else if (plan_.exchange == PlannedExchange::hierarchical) {
     d.choice = "between groups of elements";
     d.why = "see exchange";
     d.error_kind = ErrorKind::estimate;
@@ -86,10 +91,12 @@ void Planner::decide_bands(int reduced, double solver_bound) {
 }
 
 void Planner::decide_solver() {
+  if (plan_.degree > 0) plan_.solver_bound = GalerkinOptions{}.relative_bound;
   Decision d{"solver", "conjugate gradients to a bound of " + percent(plan_.solver_bound),
              "a thousandth of the target costs a few passes more than none"};
   d.left_out = "a factorisation";
-  if (plan_.pilot) {
+  if (plan_.degree > 0) d.why = "it costs next to nothing beside the moments";
+  if (plan_.pilot && plan_.degree == 0) {
     d.work = "passes over the matrix";
     d.planned_work = plan_.pilot->matrix_passes;
     d.full_work = static_cast<double>(plan_.elements) / 3.0;  // n^3 / 3 a band

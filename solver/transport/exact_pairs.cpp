@@ -247,14 +247,10 @@ double ExactPairs::share_from(std::uint32_t k, double factor, bool near, const P
   if (fits && count == 0) return 1.0;
   const PlanarPolygon &receiver = polygons_[pair.receiver], &source = polygons_[pair.source];
   const Vec3 x = view.points().at(k);
-  if (fits && count == 1 && !near) {
-    const double hidden =
-        view.parts.hidden_share(source, *across[0], cuts, x, receiver.plane.normal);
-    if (hidden >= 0.0) return 1.0 - hidden;
-  }
-  if (fits && view.parts.cut(source.vertices, {across.data(), count})) {
-    if (!near) return 1.0 - view.parts.hidden_share(x, receiver.plane.normal, source.plane.normal);
-    return factor > 0.0 ? view.parts.visible_factor(x, receiver.plane.normal) / factor : 0.0;
+  if (fits) {
+    const double share = view.parts.visible_share(source, {across.data(), count}, cuts, x,
+                                                  receiver.plane.normal, near, factor);
+    if (share >= 0.0) return share;
   }
   double seen = 0.0;
   for (const Polygon& part :

@@ -190,6 +190,18 @@ double ShadowParts::hidden_share(const Vec3& point, const Vec3& normal,
   return hidden / (hidden + visible);
 }
 
+double ShadowParts::visible_share(const PlanarPolygon& source,
+                                  std::span<const ShadowCone* const> cones, std::uint32_t cuts,
+                                  const Vec3& point, const Vec3& normal, bool near, double whole) {
+  if (cones.size() == 1 && !near) {
+    const double hidden = hidden_share(source, *cones[0], cuts, point, normal);
+    if (hidden >= 0.0) return 1.0 - hidden;
+  }
+  if (!cut(source.vertices, cones)) return -1.0;
+  if (!near) return 1.0 - hidden_share(point, normal, source.plane.normal);
+  return whole > 0.0 ? visible_factor(point, normal) / whole : 0.0;
+}
+
 double ShadowParts::visible_factor(const Vec3& point, const Vec3& normal) const {
   return factor_of(*memory_->visible, point, normal);
 }

@@ -62,6 +62,13 @@ class ShadowParts {
   /// source lies wholly above the receiver's horizon.
   double hidden_share(const Vec3& point, const Vec3& normal, const Vec3& source_normal) const;
 
+  /// Visible share of the source behind cones that all lie across it; `cuts` as test_shadow has
+  /// them of the last. Near: by Lambert's formula, `whole` being that of all the source; else by
+  /// the kernel at centroids, as above. Negative as `cut` is false.
+  double visible_share(const PlanarPolygon& source, std::span<const ShadowCone* const> cones,
+                       std::uint32_t cuts, const Vec3& point, const Vec3& normal, bool near,
+                       double whole);
+
   /// Of the last cut: what the element sees of the source, by Lambert's formula.
   double visible_factor(const Vec3& point, const Vec3& normal) const;
   /// The same of what is hidden.

@@ -7,7 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "transport/shared_directions.h"
+#include "transport/reduced_basis.h"
 #include "transport/solve_state.h"
 
 namespace truebox {
@@ -166,7 +166,7 @@ SolveSummary solve_radiosity(const ExchangeOperator& exchange, const BandMatrix&
   if (!source.allFinite())
     state.summary.outcome = SolveOutcome::diverged;
   else if (options.method != SolveMethod::conjugate_gradient || !options.share_bands ||
-           !solve_on_shared_directions(state))
+           !solve_on_reduced_basis(state))
     run(state);
   if (irradiance) {
     *irradiance = std::move(state.gathered);

@@ -17,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
+using testing::Not;
 
 CommandOutcome run(const std::string& arguments, const std::string& environment = "") {
   return run_command(environment +
@@ -105,6 +106,29 @@ TEST(PlanProgram, SolvesAsPlannedByOneWordAndByThePrintedLine) {
   EXPECT_EQ(run("solve " + scene + " --auto --elements 100").code, 64);
 }
 
+// Constants would take more elements than fit.
+TEST(PlanProgram, TakesPolynomialsForMeansAndConstantsForFilesOfAllElements) {
+  const std::string scene = room("polynomial.toml"), a = scratch_path("polynomial.json"),
+                    b = scratch_path("polynomial_typed.json");
+  const std::string wished = "solve " + scene + " --auto --target-error 0.02% -o " + a;
+  const CommandOutcome automatic = run(wished);
+  EXPECT_EQ(automatic.code, 0) << automatic.text;
+  EXPECT_THAT(automatic.text, HasSubstr("as planned: truebox solve"));
+  EXPECT_THAT(automatic.text, HasSubstr("--basis "));
+  const std::size_t at = automatic.text.find("truebox solve") + 8;
+  const std::string line = automatic.text.substr(at, automatic.text.find('\n', at) - at);
+  ASSERT_EQ(run(line + " -o " + b).code, 0) << line;
+  const json first = json::parse(text_of(a)), second = json::parse(text_of(b));
+  EXPECT_EQ(first.at("surfaces"), second.at("surfaces"));
+  EXPECT_LE(first.at("largest_relative_bound_of_a_surface").get<double>(), 2e-4);
+  EXPECT_EQ(first.at("surfaces")[0].at("irradiance").size(), 3u);
+  const CommandOutcome elements =
+      run("solve " + scene + " --auto --target-error 5% -o " + scratch_path("polynomial.vtu"));
+  EXPECT_EQ(elements.code, 0) << elements.text;
+  EXPECT_THAT(elements.text, Not(HasSubstr("--basis")));
+  EXPECT_EQ(run("solve " + scene + " --auto --basis linear").code, 64);
+}
+
 // The cube with two walls of chart colours under daylight, in 31 bands.
 std::string colourful_room() {
   std::string text = text_of(room("grey.toml"));
@@ -165,11 +189,30 @@ TEST(SweepProgram, SweepsEveryMethodAgainstTracedPathsAndReports) {
     methods.insert(point.at("method").get<std::string>());
     front |= point.at("on_front").get<bool>();
   }
-  EXPECT_EQ(methods.size(), 6u);
+  EXPECT_EQ(methods.size(), 5u);
   EXPECT_TRUE(front);
+  EXPECT_THAT(sweep.at("left_out").dump(), HasSubstr("by rays: nothing can stand between"));
+  EXPECT_THAT(swept.text, HasSubstr("left out: a matrix by rays"));
   EXPECT_THAT(sweep.at("reference").get<std::string>(), HasSubstr("path tracing"));
   EXPECT_GT(sweep.at("reference_error").get<double>(), 0.0);
   EXPECT_THAT(text_of(folder + "/report.html"), HasSubstr("Pareto front"));
+}
+
+// Who takes longer must gain one percent that the reference can tell.
+TEST(SweepProgram, PutsNobodyOnTheFrontForAGainThatIsNone) {
+  const std::string scene = room("front.toml", 0.7), folder = scratch_path("front");
+  ASSERT_EQ(run(small_sweep(scene, folder)).code, 0);
+  const json sweep = json::parse(text_of(folder + "/sweep.json"));
+  const double resolved = sweep.at("errors_told_apart_above");
+  EXPECT_GT(resolved, sweep.at("reference_error").get<double>());
+  const auto& points = sweep.at("points");
+  for (const json& p : points)
+    for (const json& q : points)
+      if (p.at("on_front") && q.at("on_front") && p.at("cpu_s") < q.at("cpu_s")) {
+        EXPECT_GT(0.99 * p.at("error").get<double>(),
+                  std::max(resolved, q.at("error").get<double>()) * (1.0 - 1e-12))
+            << q;
+      }
 }
 
 TEST(SweepProgram, GoesOnWhereItWasStopped) {
@@ -216,6 +259,7 @@ TEST(SweepProgram, OfAMirrorTracesPathsAgainstManyMore) {
   ASSERT_EQ(swept.code, 0) << swept.text;
   const json sweep = json::parse(text_of(folder + "/sweep.json"));
   for (const json& point : sweep.at("points")) EXPECT_EQ(point.at("method"), "paths");
+  EXPECT_THAT(sweep.at("left_out").dump(), HasSubstr("not Lambertian"));
   EXPECT_THAT(sweep.at("reference").get<std::string>(), HasSubstr("1024 paths"));
 }
 

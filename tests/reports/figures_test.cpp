@@ -68,6 +68,23 @@ TEST(LinePlot, PutsPointsWhereTheirNumbersSay) {
   EXPECT_THAT(texts(svg), testing::IsSupersetOf({"x / nm", "y", "points"}));
 }
 
+TEST(LinePlot, DrawsLawsInNoColourOfASeriesAndEachInADashOfItsOwn) {
+  LinePlot plot{"t", {"x", ""}, {"y", ""}, {}};
+  for (int k = 0; k < 9; ++k) {
+    plot.series.push_back({std::to_string(k), {0, 1}, {0, 1.0 + k}});
+    plot.series.back().dashed = k == 2 || k > 6;
+  }
+  const std::string svg = to_svg(plot);
+  const auto count = [&](const std::string& text) {
+    int n = 0;
+    for (std::size_t at = svg.find(text); at != std::string::npos; at = svg.find(text, at + 1)) ++n;
+    return n;
+  };
+  for (int k = 0; k < 6; ++k)
+    EXPECT_EQ(count("--series-" + std::to_string(k)), 4) << "curve and legend, stroke and fill";
+  for (const char* dash : {"\"6 5\"", "\"2 4\"", "\"11 4 2 4\""}) EXPECT_EQ(count(dash), 2) << dash;
+}
+
 TEST(LinePlot, BreaksALineWhereThereIsNoNumber) {
   LinePlot plot{"t", {"x", ""}, {"y", ""}, {}};
   plot.series = {{"s", {1, 2, 3, 4, 5}, {1, 2, std::numeric_limits<double>::quiet_NaN(), 2, 1}}};

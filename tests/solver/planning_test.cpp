@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <random>
 
+#include "planning/field_error.h"
 #include "planning/full_model.h"
 #include "planning/line_pilot.h"
 #include "planning/plan.h"
@@ -15,6 +17,7 @@
 #include "support/scratch.h"
 #include "support/tiny_scenes.h"
 #include "transport/enclosure.h"
+#include "transport/polynomial_means.h"
 #include "transport/predict_to_target.h"
 
 namespace truebox {
@@ -233,6 +236,137 @@ TEST(Plan, AdaptsWhereAUniformMatrixDoesNotFitThoughItWereSooner) {
   EXPECT_GT(decision(plan, "mesh").full_work, limit) << "nothing is left to choose";
   EXPECT_LT(static_cast<double>(plan.elements), limit);
   EXPECT_LE(decision(plan, "mesh").error, 0.01);
+}
+
+Scene closed_box() {
+  return in_bands_at(
+      read_scene(std::string(TRUEBOX_REFERENCE_DIR) + "/independent_renders/closed_box.toml"),
+      {450.0, 550.0, 650.0});
+}
+
+PlanRequest rms_target(double error) {
+  PlanRequest request = target(error);
+  request.measure = ErrorMeasure::rms_irradiance;
+  request.goal = Goal{Goal::Kind::irradiance, {}, 0, 0};
+  return request;
+}
+
+// Uniform elements: from a matrix of some 4000 on (tests/benchmark/links_or_matrix.cpp). Adapted
+// ones with a matrix may still be sooner than both; on a busy machine, too.
+TEST(Plan, OfRmsIrradianceTakesLinksOrAdaptsWhereAUniformMatrixTakesLonger) {
+  const Scene box = in_bands_at(closed_box(), {550.0});
+  const Plan coarse = make_plan(box, rms_target(0.02));
+  EXPECT_EQ(coarse.exchange, PlannedExchange::full_matrix);
+  EXPECT_NE(decision(coarse, "exchange").why.find("links take longer below"), std::string::npos);
+  Plan plan = make_plan(box, rms_target(0.002));
+  EXPECT_TRUE(plan.exchange == PlannedExchange::hierarchical || plan.mesh == PlannedMesh::adapted);
+  const Decision& exchange = decision(plan, "exchange");
+  const std::string from = "links are sooner from ";
+  const std::size_t at = exchange.why.find(from);
+  ASSERT_NE(at, std::string::npos) << exchange.why;
+  EXPECT_LT(std::stod(exchange.why.substr(at + from.size())), decision(plan, "mesh").full_work);
+  if (plan.exchange == PlannedExchange::hierarchical) {
+    EXPECT_NEAR(plan.link_tolerance, 0.002, 1e-9);
+    EXPECT_EQ(exchange.error_kind, ErrorKind::estimate);
+    EXPECT_GT(exchange.saving(), 2.0) << "memory";
+  }
+}
+
+const ClaimCheck& claim_of(const std::vector<ClaimCheck>& claims, const std::string& name) {
+  for (const ClaimCheck& c : claims)
+    if (c.claim == name) return c;
+  throw std::runtime_error("no claim of " + name);
+}
+
+TEST(Plan, HoldsLinksToTheMatrixOfTheSameElements) {
+  const Scene box = in_bands_at(closed_box(), {550.0});
+  Plan plan;
+  plan.needs = requirements(box);
+  plan.exchange = PlannedExchange::hierarchical;
+  plan.link_tolerance = 0.01;
+  const auto claims = check_claims(box, plan, 500);
+  const ClaimCheck& links = claim_of(claims, "links instead of a matrix");
+  EXPECT_TRUE(links.holds()) << links.difference << " > " << links.allowed;
+  EXPECT_GT(links.difference, 1e-4) << "links leave something out";
+  EXPECT_LT(links.planned_work, links.full_work);
+}
+
+PlanRequest means_target(double error) {
+  PlanRequest request = target(error);
+  request.means_only = true;
+  return request;
+}
+
+// A few dozen elements instead of more than fit the memory.
+TEST(Plan, TakesPolynomialsForMeansInAConvexRoomAndHoldsThemToConstants) {
+  const Scene room = convex_grey_room();
+  const Plan plan = make_plan(room, means_target(1e-4));
+  ASSERT_GE(plan.degree, 1);
+  EXPECT_LT(plan.elements, 500u);
+  EXPECT_GT(decision(plan, "basis").saving(), 20.0);
+  EXPECT_EQ(decision(plan, "basis").error_kind, ErrorKind::bound);
+  PolynomialOptions options;
+  options.degree = plan.degree;
+  options.elements = plan.elements;
+  options.kernel_tolerance = kernel_tolerance_for(1e-4);
+  const TargetedMeans met = polynomial_means_to_target(room, options, 1e-4);
+  EXPECT_TRUE(met.is_reached);
+  EXPECT_LE(met.steps.size(), 2u) << "foretold: " << plan.elements;
+  const auto claims = check_claims(room, plan, 400);
+  const ClaimCheck& basis = claim_of(claims, "polynomials, not constants");
+  EXPECT_TRUE(basis.holds()) << basis.difference << " > " << basis.allowed;
+  EXPECT_LT(basis.allowed, 0.02);
+  EXPECT_LT(basis.planned_work, basis.full_work);
+}
+
+TEST(Plan, KeepsConstantsWherePolynomialsCannotServe) {
+  const auto reason = [](const Scene& scene, const PlanRequest& request) {
+    const Plan plan = make_plan(scene, request);
+    EXPECT_EQ(plan.degree, 0);
+    return decision(plan, "basis").why;
+  };
+  const auto says = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos;
+  };
+  const Scene room = convex_grey_room();
+  EXPECT_TRUE(says(reason(room, target(1e-3)), "values at points"));
+  EXPECT_TRUE(says(reason(room, means_target(0.05)), "little to gain"));
+  Scene blocked = tiny::cube_with_block(1.0, 0.5, 1.0);
+  EXPECT_TRUE(says(reason(blocked, means_target(0.05)), "kinks at shadows"));
+  Scene black = room;
+  black.materials.push_back({"soot", Reflectance(7, 0.0), RadiantExitance(7, 0.0)});
+  black.surfaces[0].material = 2;
+  EXPECT_TRUE(says(reason(black, means_target(1e-3)), "reflects nothing"));
+}
+
+// Held to a solution of five times as many elements, which takes off most of the error.
+TEST(FieldError, OfThreeGridsIsWhatTheFieldIsOffByToAFactorOfTwo) {
+  Scene scene = tiny::cube_with_block(1.0, 0.7, 0.0);
+  scene.materials.push_back({"lamp", Reflectance(1, 0.0), RadiantExitance(1, 1.0)});
+  scene.surfaces[1].material = 1;
+  PredictOptions options;
+  options.near_sources = false;
+  options.elements = 600;
+  const Prediction coarse(scene, options);
+  options.elements = 2400;
+  const Prediction fine(scene, options);
+  const PatchMesh& mesh = fine.fine().mesh;
+  Gather::Scratch scratch;
+  double squares = 0.0, area_m2 = 0.0, mean = 0.0;
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const Patch& patch = mesh.patches[i];
+    if (!fine.fine().usable[i]) continue;
+    const double truth = fine.irradiance_on(patch.piece, patch.centroid, scratch).value[0];
+    const double off = coarse.irradiance_on(patch.piece, patch.centroid, scratch).value[0] - truth;
+    squares += patch.area_m2 * off * off;
+    mean += patch.area_m2 * truth;
+    area_m2 += patch.area_m2;
+  }
+  const double error = std::sqrt(squares * area_m2) / mean, estimate = field_error(coarse);
+  std::printf("field of %zu elements: off by %.3g, estimated %.3g\n", coarse.fine().mesh.size(),
+              error, estimate);
+  EXPECT_GT(estimate, 0.5 * error);
+  EXPECT_LT(estimate, 2.0 * error);
 }
 
 TEST(Plan, TakesLinksWhereOnlyTheyFit) {

@@ -3,15 +3,14 @@
 
 #include <gmock/gmock.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
 #include <stdexcept>
 
+#include "support/direct_solution.h"
 #include "support/tiny_scenes.h"
-#include "transport/interpolated_product.h"
 
 namespace truebox {
 namespace {
@@ -69,17 +68,6 @@ FormFactors factors_of(Room room) {
   options.occlusion = room == Room::block;
   FormFactors f = form_factors(mesh, scene, Visibility(mesh, scene), options);
   return room == Room::coupled ? coupled_rooms(f) : f;
-}
-
-BandMatrix direct_solution(const FormFactors& f, const BandMatrix& rho, const BandMatrix& source) {
-  BandMatrix b(rho.rows(), rho.cols());
-  for (Index k = 0; k < rho.cols(); ++k) {
-    Eigen::MatrixXd a = Eigen::MatrixXd::Identity(f.size(), f.size());
-    for (Index i = 0; i < f.size(); ++i)
-      a.row(i) -= rho(i, k) / f.area_m2[i] * f.exchange_area_m2.row(i);
-    b.col(k) = a.partialPivLu().solve(source.col(k));
-  }
-  return b;
 }
 
 class SolveRadiosity : public testing::TestWithParam<Case> {
@@ -346,145 +334,6 @@ TEST(SolveRadiosity, RefusesToFactoriseWhatIsTooLarge) {
   EXPECT_THROW(
       solve_radiosity(f, BandMatrix::Constant(4001, 1, 0.5), BandMatrix::Ones(4001, 1), options, b),
       std::length_error);
-}
-
-// Three materials and forty bands: what a measured scene looks like.
-class SharedDirections : public testing::Test {
- protected:
-  const FormFactors f_ = factors_of(Room::block);
-  const Index n_ = f_.size();
-  static constexpr Index kBands = 40;
-  BandMatrix rho_{n_, kBands}, source_{BandMatrix::Zero(n_, kBands)};
-
-  void SetUp() override {
-    for (Index i = 0; i < n_; ++i)
-      for (Index k = 0; k < kBands; ++k) {
-        const double t = static_cast<double>(k) / (kBands - 1);
-        rho_(i, k) = i % 3 == 0   ? 0.72 + 0.05 * std::sin(9.0 * t)
-                     : i % 3 == 1 ? 0.05 + 0.6 / (1.0 + std::exp(-20.0 * (t - 0.6)))
-                                  : 0.1 + 0.4 * std::exp(-std::pow((t - 0.4) / 0.1, 2));
-        if (i < 4) source_(i, k) = 0.2 + t;
-      }
-  }
-};
-
-TEST_F(SharedDirections, HoldsItsBoundInEveryBand) {
-  const BandMatrix truth = direct_solution(f_, rho_, source_);
-  for (const double bound : {1e-3, 1e-6, 1e-9, 1e-11}) {
-    SolveOptions options;
-    options.relative_bound = bound;
-    BandMatrix b, irradiance;
-    const SolveSummary summary = solve_radiosity(f_, rho_, source_, options, b, {}, &irradiance);
-    ASSERT_EQ(summary.outcome, SolveOutcome::converged);
-    for (Index k = 0; k < kBands; ++k) {
-      EXPECT_LE((b.col(k) - truth.col(k)).cwiseAbs().maxCoeff(), summary.error_bound[k] + 1e-14);
-      EXPECT_LE(summary.error_bound[k], bound * b.col(k).maxCoeff() * (1 + 1e-12));
-      const Eigen::VectorXd exact = (f_.exchange_area_m2 * truth.col(k)).cwiseQuotient(f_.area_m2);
-      EXPECT_LE((irradiance.col(k) - exact).cwiseAbs().maxCoeff(),
-                summary.error_bound[k] * f_.summary.row_sum_max + 1e-14);
-    }
-    if (bound >= 1e-6) {
-      EXPECT_GT(summary.bands_reduced, kBands / 4) << "it saves nothing";
-    }
-  }
-}
-
-TEST_F(SharedDirections, CostsAFractionOfThePasses) {
-  SolveOptions shared, each;
-  each.share_bands = false;
-  BandMatrix b, c;
-  const SolveSummary few = solve_radiosity(f_, rho_, source_, shared, b);
-  const SolveSummary all = solve_radiosity(f_, rho_, source_, each, c);
-  EXPECT_EQ(all.bands_reduced, 0);
-  EXPECT_GT(few.bands_reduced, kBands / 4);
-  EXPECT_LT(few.matrix_passes, 0.5 * all.matrix_passes);
-}
-
-TEST_F(SharedDirections, ReachesABoundNearRounding) {
-  rho_ *= 0.999 / rho_.maxCoeff();
-  SolveOptions options;
-  options.relative_bound = 1e-12;
-  BandMatrix b;
-  const SolveSummary summary = solve_radiosity(f_, rho_, source_, options, b);
-  ASSERT_EQ(summary.outcome, SolveOutcome::converged) << summary.brief();
-  const BandMatrix truth = direct_solution(f_, rho_, source_);
-  for (Index k = 0; k < kBands; ++k)
-    // LU loses cond = 2e3 times 2e-16.
-    EXPECT_LE((b.col(k) - truth.col(k)).cwiseAbs().maxCoeff(),
-              summary.error_bound[k] + 1e-12 * truth.col(k).maxCoeff())
-        << k;
-}
-
-TEST_F(SharedDirections, DoesNotAskForFewMaterials) {
-  for (Index i = 0; i < n_; ++i) rho_.row(i) *= 1.0 - 0.3 * static_cast<double>(i) / n_;
-  BandMatrix b;
-  const SolveSummary summary = solve_radiosity(f_, rho_, source_, {}, b);
-  EXPECT_EQ(summary.outcome, SolveOutcome::converged);
-  EXPECT_GT(summary.bands_reduced, kBands / 4);
-}
-
-TEST_F(SharedDirections, MultipliesEveryBandWhereSpectraHaveNothingInCommon) {
-  rho_ = (0.45 + 0.45 * BandMatrix::Random(n_, kBands).array()).matrix();
-  source_ = BandMatrix::Random(n_, kBands).cwiseAbs();
-  BandMatrix b;
-  const SolveSummary summary = solve_radiosity(f_, rho_, source_, {}, b);
-  ASSERT_EQ(summary.outcome, SolveOutcome::converged);
-  EXPECT_LE(summary.bands_reduced, kBands / 8);
-  const BandMatrix truth = direct_solution(f_, rho_, source_);
-  for (Index k = 0; k < kBands; ++k)
-    EXPECT_LE((b.col(k) - truth.col(k)).cwiseAbs().maxCoeff(), summary.error_bound[k] + 1e-14);
-}
-
-TEST_F(SharedDirections, StatesABoundThatHoldsWhereIterationsEndEarly) {
-  SolveOptions options;
-  options.iteration_limit = 3;
-  BandMatrix b;
-  const SolveSummary summary = solve_radiosity(f_, rho_, source_, options, b);
-  EXPECT_EQ(summary.outcome, SolveOutcome::iteration_limit);
-  const BandMatrix truth = direct_solution(f_, rho_, source_);
-  for (Index k = 0; k < kBands; ++k) {
-    const double error = (b.col(k) - truth.col(k)).cwiseAbs().maxCoeff();
-    EXPECT_LE(error, summary.error_bound[k]);
-    EXPECT_GT(error, 1e-3 * summary.error_bound[k]);
-  }
-}
-
-TEST(InterpolatedProduct, MissesNoMoreThanItSays) {
-  const FormFactors f = factors_of(Room::block);
-  const DenseExchange exchange(f);
-  // Forty columns of a space of six, and one that has nothing to do with it.
-  BandMatrix x = BandMatrix::Random(f.size(), 6) * BandMatrix::Random(6, 40);
-  x.col(17) = BandMatrix::Random(f.size(), 1);
-  Eigen::VectorXd allowed = Eigen::VectorXd::Constant(40, 1e-6);
-  allowed[5] = -1.0;
-  const InterpolatedProduct found = InterpolatedProducts(exchange)(x, allowed);
-  EXPECT_EQ(found.products, 7);
-  const BandMatrix error = f.exchange_area_m2 * x - found.product;
-  const Eigen::VectorXd row_sums = f.exchange_area_m2.rowwise().sum();
-  for (Index k = 0; k < 40; ++k) {
-    if (k == 5) continue;
-    EXPECT_LE(found.missed[k], 1e-6);
-    for (Index i = 0; i < f.size(); ++i)
-      EXPECT_LE(std::abs(error(i, k)), row_sums[i] * found.missed[k] + 1e-13);
-  }
-  EXPECT_EQ(found.product.col(5).norm(), 0.0);
-}
-
-TEST_F(SharedDirections, TakesBandsThatHaveNothingInCommon) {
-  // A black band, a nearly white one, one without light and emission over twelve decades.
-  rho_.col(3).setZero();
-  rho_.col(7).setConstant(0.9999);
-  source_.col(11).setZero();
-  source_.col(20) *= 1e-6;
-  source_.col(21) *= 1e6;
-  BandMatrix b;
-  const SolveSummary summary = solve_radiosity(f_, rho_, source_, {}, b);
-  ASSERT_EQ(summary.outcome, SolveOutcome::converged);
-  const BandMatrix truth = direct_solution(f_, rho_, source_);
-  for (Index k = 0; k < kBands; ++k)
-    EXPECT_LE((b.col(k) - truth.col(k)).cwiseAbs().maxCoeff(),
-              summary.error_bound[k] + 1e-10 * truth.col(k).maxCoeff())
-        << k;
 }
 
 }  // namespace
