@@ -309,7 +309,7 @@ std::string two_digits(double x) {
   return fmt::format("{:.0f}", x < 10.0 ? x : unit * std::round(x / unit));
 }
 
-// Lamps that nothing sees and scenes without any: why all is dark.
+// Lamps that nothing sees and scenes without any: why it is dark.
 std::string describe_darkness(const Predicted& p) {
   const PatchMesh& mesh = p.prediction->fine().mesh;
   std::vector<char> sees(p.scene.surfaces.size(), 0);
@@ -319,12 +319,12 @@ std::string describe_darkness(const Predicted& p) {
   std::string text;
   for (std::size_t s = 0; s < sees.size(); ++s) {
     const Surface& surface = p.scene.surfaces[s];
-    const bool emits = p.scene.material_of(surface).emits();
-    is_lit = is_lit || emits;
-    if (!sees[s] && !surface.is_opening)
+    if (surface.is_opening || !p.scene.material_of(surface).emits()) continue;
+    is_lit = true;
+    if (!sees[s])
       text +=
-          fmt::format("  {}{} faces no surface of the scene and is left out{}\n", surface.name,
-                      emits ? ", which emits," : "", emits ? ": its light reaches nothing" : "");
+          fmt::format("  {} emits and faces no surface of the scene: its light reaches nothing\n",
+                      surface.name);
   }
   return is_lit ? text : text + "  no surface emits: all of the scene is dark\n";
 }
