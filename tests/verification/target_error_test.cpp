@@ -160,7 +160,9 @@ TEST(RadiosityByReflectance, IsThatOfADifference) {
 TEST(SurfaceMeans, AreWithinTheirBoundOfCertifiedOnesAndCloserThanTheFinestGridAlone) {
   const Scene scene = lit_cube();
   for (const std::size_t elements : {300u, 900u, 2000u}) {
-    const Prediction prediction(scene, {.elements = elements});
+    PredictOptions options;
+    options.elements = elements;
+    const Prediction prediction(scene, options);
     const SurfaceMeans means = prediction.surface_means();
     const BandMatrix irradiance = prediction.irradiance(),
                      of_finest = prediction.surface_irradiance_bound();
@@ -184,9 +186,14 @@ TEST(SurfaceMeans, AreWithinTheirBoundOfCertifiedOnesAndCloserThanTheFinestGridA
 // must not be taken for a high order. Truth: 4500 elements, whose bound is a fourth of these.
 TEST(SurfaceMeans, AreWithinTheirBoundInABlockedRoomWhereGridsAgreeByChance) {
   const Scene scene = blocked_room(0.95);
-  const SurfaceMeans truth = Prediction(scene, {.elements = 4500}).surface_means();
+  const auto means_with = [&](std::size_t elements) {
+    PredictOptions options;
+    options.elements = elements;
+    return Prediction(scene, options).surface_means();
+  };
+  const SurfaceMeans truth = means_with(4500);
   for (const std::size_t elements : {500u, 1000u, 2000u}) {
-    const SurfaceMeans means = Prediction(scene, {.elements = elements}).surface_means();
+    const SurfaceMeans means = means_with(elements);
     for (Index s = 0; s < means.irradiance.rows(); ++s) {
       if (truth.area_m2[s] == 0.0) continue;  // the block's underside
       EXPECT_NEAR(means.irradiance(s, 0), truth.irradiance(s, 0), means.error_bound(s, 0))
