@@ -97,11 +97,12 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       ->capture_default_str()
       ->check(CLI::IsMember(methods));
   command
-      .add_option("--form-factors", a.form_factors,
-                  "exact-visibility (shadow outlines, no noise) or ray-casting: a matrix of all "
-                  "pairs; streamed: the same as exact-visibility without keeping it, for little "
-                  "memory and some forty times the time; hierarchical: links between groups of "
-                  "elements, for many elements")
+      .add_option(
+          "--form-factors", a.form_factors,
+          "exact-visibility (shadow outlines, no noise) or ray-casting: a matrix of all "
+          "pairs; streamed: the same as exact-visibility without keeping it, for little "
+          "memory and forty to seventy times the time; hierarchical: links between groups of "
+          "elements, for many elements")
       ->capture_default_str()
       ->check(CLI::IsMember({"exact-visibility", "ray-casting", "streamed", "hierarchical"}));
   command
@@ -122,9 +123,11 @@ void add_prediction_options(CLI::App& command, PredictionArguments& a,
       ->capture_default_str()
       ->check(CLI::Range(1e-13, 0.5));
   command
-      .add_option("--target-error", a.target_error,
-                  "choose elements and solver bound so that each surface's mean is bound to this "
-                  "share (\"0.5%\" or 0.005)")
+      .add_option(
+          "--target-error", a.target_error,
+          "choose elements and solver bound so that the error bound of what is asked for is "
+          "this share (\"0.5%\" or 0.005) of its irradiance or less: of each place of probe, "
+          "else of each surface's mean; in every band")
       ->check(check_share);
   command.add_flag(std::string("--adaptive{") + kDefaultGoal + "}", a.adaptive,
                    "refine where the error comes from instead of everywhere; =everywhere, "
@@ -212,6 +215,11 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
   options.watch_finest = a.watch_finest;
   options.form_factors.memory_limit_bytes = a.memory_MiB << 20;
   if (a.form_factors == "hierarchical") {
+    if (!a.target_error.empty())
+      throw InputError("--target-error", 0,
+                       "form factors with a bound (exact-visibility or streamed): links have an "
+                       "estimate",
+                       "--form-factors hierarchical");
     const HierarchyOptions hierarchy{a.link_tolerance, a.memory_MiB << 20};
     const std::size_t finest = finest_elements(predicted->scene, a.elements);
     try {
@@ -256,11 +264,12 @@ std::unique_ptr<Predicted> predict(const PredictionArguments& wished) {
   if (a.target_error.empty()) {
     predicted->prediction = solve(options);
   } else {
-    if (options.elements == PredictOptions{}.elements) options.elements = kFirstElements;
-    auto targeted = predict_to_target(options, *share_of(a.target_error), solve);
-    predicted->prediction = std::move(targeted.prediction);
-    predicted->target_steps = std::move(targeted.steps);
-    predicted->misses_target = !targeted.is_reached;
+    if (options.elements == PredictOptions{}.elements)
+      options.elements = std::max(kFirstElements, least_reliable_elements(predicted->scene));
+    predicted->target = predict_to_target(options, *share_of(a.target_error), solve,
+                                          a.judge ? a.judge : relative_bound_of_surfaces);
+    predicted->prediction = std::move(predicted->target.prediction);
+    predicted->misses_target = !predicted->target.is_reached;
   }
   predicted->seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -294,6 +303,32 @@ std::string describe_repair(const FormFactorSummary& f) {
       f.repair_rms, f.repair_max, f.repair_negative);
 }
 
+// "4900000": what is foretold to two digits.
+std::string two_digits(double x) {
+  const double unit = std::pow(10.0, std::floor(std::log10(x)) - 1.0);
+  return fmt::format("{:.0f}", x < 10.0 ? x : unit * std::round(x / unit));
+}
+
+// Lamps that nothing sees and scenes without any: why it is dark.
+std::string describe_darkness(const Predicted& p) {
+  const PatchMesh& mesh = p.prediction->fine().mesh;
+  std::vector<char> sees(p.scene.surfaces.size(), 0);
+  for (std::size_t i = 0; i < mesh.size(); ++i)
+    sees[mesh.surface_of(mesh.patches[i])] |= p.prediction->fine().usable[i];
+  bool is_lit = false;
+  std::string text;
+  for (std::size_t s = 0; s < sees.size(); ++s) {
+    const Surface& surface = p.scene.surfaces[s];
+    if (surface.is_opening || !p.scene.material_of(surface).emits()) continue;
+    is_lit = true;
+    if (!sees[s])
+      text +=
+          fmt::format("  {} emits and faces no surface of the scene: its light reaches nothing\n",
+                      surface.name);
+  }
+  return is_lit ? text : text + "  no surface emits: all of the scene is dark\n";
+}
+
 std::string describe_links(const Prediction& prediction) {
   const LinkSummary& links = *prediction.fine().links;
   return fmt::format(
@@ -314,6 +349,29 @@ std::string describe_links(const Prediction& prediction) {
 }
 
 }  // namespace
+
+std::string name_of_band(const Scene& scene, std::size_t band) {
+  return scene.is_total ? "all wavelengths" : fmt::format("{:.0f} nm", scene.bands.centre_nm(band));
+}
+
+std::string describe_target(const Predicted& p) {
+  std::string text;
+  for (const TargetStep& step : p.target.steps)
+    text += fmt::format("  {} elements: largest bound {:.3g} % ({})\n", step.elements,
+                        100.0 * step.relative_bound, step.where);
+  if (!p.misses_target) return text;
+  if (p.target.elements_needed == 0.0)
+    return text + "  the target error is not reached: " + p.prediction->fine().solve.brief() + "\n";
+  const double fits = p.target.elements_that_fit;
+  return text + fmt::format(
+                    "  the target error is not reached: some {} elements are foretold for it ({} "
+                    "MiB as a matrix); {:.0f} fit, for which a bound of {:.2g} % is foretold\n"
+                    "  further reach: more --memory, or --form-factors streamed (no matrix, much "
+                    "slower)\n",
+                    two_digits(p.target.elements_needed),
+                    two_digits(std::pow(p.target.elements_needed, 2) * sizeof(double) / (1 << 20)),
+                    fits, 100.0 * p.target.bound_that_fits);
+}
 
 std::string describe(const Predicted& p) {
   const GridSolution& grid = p.prediction->fine();
@@ -351,6 +409,7 @@ std::string describe(const Predicted& p) {
   if (f.buried_patches > 0)
     text +=
         fmt::format("  {} elements lie under another surface and see nothing\n", f.buried_patches);
+  text += describe_darkness(p);
   if (f.covered_patches > 0)
     text += fmt::format("  {} elements lie partly under another surface: their free parts count\n",
                         f.covered_patches);
@@ -366,11 +425,7 @@ std::string describe(const Predicted& p) {
     text += fmt::format("  mean error bound: grids {:.2g} %, form factors {:.1g} %, {} {:.1g} %\n",
                         100.0 * shares->discretisation, 100.0 * shares->form_factors,
                         grid.links ? "links and solver" : "solver", 100.0 * shares->solver);
-  for (const TargetStep& step : p.target_steps)
-    text += fmt::format("  {} elements: means of surfaces bound to {:.3g} %\n", step.elements,
-                        100.0 * step.relative_bound);
-  if (p.misses_target)
-    text += "  the target error is not reached: finer grids do not fit the memory limit\n";
+  text += describe_target(p);
   if (grid.links)
     text +=
         "  error bound: an estimate only, with three times what the links are thought to leave "
@@ -384,34 +439,20 @@ std::string describe(const Predicted& p) {
 }
 
 std::vector<SurfaceMean> surface_means(const Prediction& prediction) {
-  const PatchMesh& mesh = prediction.fine().mesh;
-  const BandMatrix radiosity = prediction.radiosity();
-  const BandMatrix bound = prediction.surface_irradiance_bound();
-  const BandMatrix irradiance = prediction.irradiance();
+  const Scene& scene = prediction.scene();
+  const SurfaceMeans of = prediction.surface_means();
   std::vector<SurfaceMean> means;
-  for (const Surface& surface : prediction.scene().surfaces) {
-    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(radiosity.cols());
-    means.push_back({surface.name, 0.0, zero, zero, zero});
-  }
-  for (std::size_t i = 0; i < mesh.size(); ++i) {
-    if (!prediction.fine().usable[i]) continue;
-    SurfaceMean& mean = means[mesh.surface_of(mesh.patches[i])];
-    const auto row = static_cast<Eigen::Index>(i);
-    const double area = prediction.fine().free_area_m2[row];
-    mean.area_m2 += area;
-    mean.radiosity += area * radiosity.row(row).transpose();
-    mean.irradiance += area * irradiance.row(row).transpose();
-  }
-  for (std::size_t k = 0; k < means.size(); ++k) {
-    const auto& rho = prediction.scene().material_of(prediction.scene().surfaces[k]).reflectance;
-    const Eigen::Map<const Eigen::VectorXd> reflectance(rho.values.data(), bound.cols());
-    means[k].radiosity_bound =
-        reflectance.cwiseProduct(bound.row(static_cast<Eigen::Index>(k)).transpose());
-  }
-  std::erase_if(means, [](const SurfaceMean& m) { return m.area_m2 == 0.0; });
-  for (SurfaceMean& mean : means) {
-    mean.radiosity /= mean.area_m2;
-    mean.irradiance /= mean.area_m2;
+  for (std::size_t s = 0; s < scene.surfaces.size(); ++s) {
+    const auto row = static_cast<Eigen::Index>(s);
+    if (of.area_m2[row] == 0.0) continue;
+    const Material& material = scene.material_of(scene.surfaces[s]);
+    const Eigen::Map<const Eigen::VectorXd> rho(material.reflectance.values.data(),
+                                                of.irradiance.cols()),
+        exitance(material.exitance.values.data(), of.irradiance.cols());
+    means.push_back({scene.surfaces[s].name, of.area_m2[row],
+                     exitance + rho.cwiseProduct(of.irradiance.row(row).transpose()),
+                     rho.cwiseProduct(of.error_bound.row(row).transpose()),
+                     of.irradiance.row(row).transpose(), of.error_bound.row(row).transpose()});
   }
   return means;
 }

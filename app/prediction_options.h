@@ -33,6 +33,7 @@ struct PredictionArguments {
   std::size_t memory_MiB = 8192;
   double relative_bound = SolveOptions{}.relative_bound;
   std::string target_error;        ///< "0.5%" or "0.005": chooses elements and solver bound
+  Judge judge;                     ///< of what has that error; empty: means of surfaces
   std::string adaptive;            ///< empty: uniform; else the goal, or kDefaultGoal
   bool gather_edges = false;       ///< the gathered field, see PredictOptions::gathered_up_to
   bool interpolated = false;       ///< the answer is interpolated between corners: for --auto
@@ -60,7 +61,8 @@ void add_prediction_options(CLI::App& command, PredictionArguments& arguments,
 struct Predicted {
   Scene scene;
   std::unique_ptr<Prediction> prediction;
-  std::vector<TargetStep> target_steps;  ///< the attempts, where a target error was asked for
+  TargetedPrediction
+      target;  ///< without its prediction; the attempts, where an error was asked for
   bool misses_target = false;
   std::string plan;                    ///< what --auto decided, as a command line; empty without it
   std::vector<AdaptStep> adapt_steps;  ///< of the last mesh, where it was adapted
@@ -84,6 +86,12 @@ const CameraDescription& find_camera(const Scene& scene, const std::string& name
 /// A progress line on stderr if that is a terminal, nothing otherwise.
 Progress terminal_progress(bool quiet = false);
 
+/// The attempts at a target error, a line each, and what is possible where it was not reached.
+std::string describe_target(const Predicted& predicted);
+
+/// "552 nm", or "all wavelengths".
+std::string name_of_band(const Scene& scene, std::size_t band);
+
 /// What the solve did, as text for a person: elements, form factors, closure, solver, time.
 std::string describe(const Predicted& predicted);
 
@@ -91,7 +99,7 @@ std::string describe(const Predicted& predicted);
 struct SurfaceMean {
   std::string surface;
   double area_m2 = 0.0;
-  Eigen::VectorXd radiosity, radiosity_bound, irradiance;
+  Eigen::VectorXd radiosity, radiosity_bound, irradiance, irradiance_bound;
 };
 std::vector<SurfaceMean> surface_means(const Prediction& prediction);
 

@@ -67,8 +67,10 @@ nlohmann::json summary_json(const Predicted& p) {
   const GridSolution& grid = p.prediction->fine();
   const FormFactorSummary& f = grid.form_factors;
   nlohmann::json attempts = nlohmann::json::array();
-  for (const TargetStep& step : p.target_steps)
-    attempts.push_back({{"elements", step.elements}, {"relative_bound", step.relative_bound}});
+  for (const TargetStep& step : p.target.steps)
+    attempts.push_back({{"elements", step.elements},
+                        {"relative_bound", step.relative_bound},
+                        {"where", step.where}});
   nlohmann::json shares;
   if (const auto& found = p.prediction->error_shares())
     shares = {{"discretisation", found->discretisation},
@@ -119,7 +121,8 @@ nlohmann::json solution_json(const Predicted& p) {
                                 {"area", mean.area_m2},
                                 {"radiosity", values(mean.radiosity)},
                                 {"radiosity_error_bound", values(mean.radiosity_bound)},
-                                {"irradiance", values(mean.irradiance)}});
+                                {"irradiance", values(mean.irradiance)},
+                                {"irradiance_error_bound", values(mean.irradiance_bound)}});
   for (const SurfaceFlux& flux : net_fluxes(*p.prediction))
     for (auto& surface : json["surfaces"])
       if (surface["name"] == flux.surface) {
@@ -144,11 +147,7 @@ void print_surfaces(const Predicted& p) {
       bands < 3 ? std::vector<std::size_t>{0}
                 : std::vector<std::size_t>{bands / 4, bands / 2, 3 * bands / 4};
   fmt::print("{:<20}", "mean radiosity of");
-  for (std::size_t b : shown)
-    fmt::print(
-        "{:>17}{:>10}",
-        p.scene.is_total ? "all wavelengths" : fmt::format("{:.0f} nm", p.scene.bands.centre_nm(b)),
-        "bound");
+  for (std::size_t b : shown) fmt::print("{:>17}{:>10}", name_of_band(p.scene, b), "bound");
   fmt::print("   ({})\n", p.scene.exitance_unit());
   std::size_t printed = 0;
   for (const SurfaceMean& mean : surface_means(*p.prediction)) {
@@ -291,9 +290,9 @@ void add_solve_command(CLI::App& program, Action& chosen) {
       "table; truebox merge puts the parts of an array together.");
   command
       ->add_option("--basis", arguments->prediction.basis,
-                   "radiosity on an element: constant, or polynomials (Galerkin), for scenes in "
-                   "which nothing stands between two surfaces: means of the surfaces to many "
-                   "digits; --elements is some hundreds then, or as --target-error asks")
+                   "radiosity on an element: constant, or polynomials (Galerkin): means of the "
+                   "surfaces, to many digits where nothing stands between two of them; --elements "
+                   "is some hundreds then, or as --target-error asks")
       ->capture_default_str()
       ->excludes(command->get_option("--auto"))
       ->check(CLI::IsMember(basis_names()));

@@ -114,10 +114,7 @@ void print(const OnBasis& r) {
     fmt::print("  the target error is not reached: more elements do not fit the memory limit\n");
   const auto k = static_cast<Index>(r.scene.bands.size() / 2);
   fmt::print("{:<20}{:>17}{:>12}   ({})\n", "mean radiosity of",
-             r.scene.is_total
-                 ? std::string("all wavelengths")
-                 : fmt::format("{:.0f} nm", r.scene.bands.centre_nm(r.scene.bands.size() / 2)),
-             "bound", r.scene.exitance_unit());
+             name_of_band(r.scene, r.scene.bands.size() / 2), "bound", r.scene.exitance_unit());
   for (std::size_t s = 0; s < r.scene.surfaces.size(); ++s)
     if (!r.scene.surfaces[s].is_opening)
       fmt::print("{:<20}{:>17.9g}{:>12.1e}\n", r.scene.surfaces[s].name,

@@ -126,7 +126,7 @@ class RadiositySweep : public SweepSubject {
     const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
     std::vector<SweepPoint> points;
     SolveOptions options = ladders_[job].options;
-    for (const double bound : {1e-1, 1e-2, 1e-4, 1e-7, 1e-10}) {
+    for (const double bound : {1e-1, 1e-2, 1e-3, 1e-6, 1e-9, 1e-12}) {
       options.relative_bound = bound;
       points.push_back(measure(system_, truth_, options, ladders_[job].name));
       if (options.method == SolveMethod::direct || points.back().cpu_s > arguments_.time_limit_s)

@@ -27,13 +27,13 @@ std::string held_text(const SweepPoint& p) {
 }
 
 void print(const Sweep& sweep) {
-  fmt::print("{}\nerror: {}\nagainst: {}\n{:<25}{:<24}{:>10}{:>11}{:>11}{:>11}{:>11}\n",
+  fmt::print("{}\nerror: {}\nagainst: {}\n{:<25}{:<24}{:>10}{:>11}{:>11}{:>11}{:>11}  work\n",
              sweep.title, sweep.error_name, sweep.reference, "method", "setting", "time / s",
              "error", "largest", "bound", "bound held");
   for (const SweepPoint& p : sweep.points)
-    fmt::print("{:<25}{:<24}{:>10.3g}{:>11.2e}{:>11.2e}{:>11.2e}{:>11}{}\n", p.method, p.setting,
-               p.cpu_s, p.error, p.largest_error, p.bound, held_text(p),
-               p.on_front ? "  front" : "");
+    fmt::print("{:<25}{:<24}{:>10.3g}{:>11.2e}{:>11.2e}{:>11.2e}{:>11}  {}{}\n", p.method,
+               p.setting, p.cpu_s, p.error, p.largest_error, p.bound, held_text(p), p.work,
+               p.on_front ? ", front" : "");
   fmt::print("The reference itself is good to {:.2g}. * the method calls this bound an estimate.\n",
              sweep.floor);
   for (const std::string& reason : sweep.left_out) fmt::print("left out: {}\n", reason);

@@ -95,6 +95,18 @@ DistributedRows::DistributedRows(const Partition& partition, const PatchMesh& me
   if (summary_.closed) {
     leave_out_outside(own_sums);
     repair();
+  } else {
+    const VectorXd sums_m2 = row_sums();
+    VectorXd area = area_m2_.segment(partition.begin(), partition.local());
+    double covered = 0.0;
+    for (Index k = 0; k < area.size(); ++k) {
+      const auto patch = begin + static_cast<std::size_t>(k);
+      if (!usable_[patch]) continue;
+      area[k] = free_area_in_open_m2(mesh, scene, visibility, patch, sums_m2[k]);
+      covered += area[k] < mesh.patches[patch].area_m2 ? 1.0 : 0.0;
+    }
+    partition.gather(area.data(), area_m2_);
+    summary_.covered_patches = static_cast<std::size_t>(partition.sum(covered));
   }
   summary_.row_sum_max =
       partition.max(partition.local() > 0

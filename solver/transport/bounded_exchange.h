@@ -16,6 +16,9 @@ struct BoundedExchange {
 BoundedExchange bounded_exchange(const PlanarPolygon& i, const PlanarPolygon& j,
                                  double relative_tolerance);
 
+/// The terms of point_to_polygon's sum without their signs: its rounding is some epsilons of them.
+double lambert_terms(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon);
+
 /// The parts of two polygons in front of each other; false if either has none.
 bool facing_parts(const PlanarPolygon& i, const PlanarPolygon& j, Polygon& part_i, Polygon& part_j);
 

@@ -110,9 +110,19 @@ bool is_buried(const PatchMesh& mesh, const Scene& scene, const Visibility& visi
 
 bool is_free(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
              std::size_t patch, const Vec3& point) {
+  constexpr int kRays = 16;  // the normal, and a cosine-distributed spiral
+  constexpr double kGoldenAngle = 2.399963229728653;
+  if (lies_on_a_back(mesh, scene, patch, point)) return false;
   const Vec3& normal = mesh.plane_of(mesh.patches[patch]).normal;
-  const auto hit = visibility.first_hit(point + visibility.offset_m() * normal, normal, true);
-  return hit && hit->front && !lies_on_a_back(mesh, scene, patch, point);
+  const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
+  for (int k = 0; k < kRays; ++k) {
+    const double sine2 = static_cast<double>(k) / kRays, angle = kGoldenAngle * k;
+    const Vec3 direction = std::sqrt(1.0 - sine2) * normal +
+                           std::sqrt(sine2) * (std::cos(angle) * u + std::sin(angle) * v);
+    const auto hit = visibility.first_hit(point + visibility.offset_m() * normal, direction, true);
+    if (hit && hit->front) return true;
+  }
+  return false;
 }
 
 bool is_partly_covered(const PatchMesh& mesh, const Scene& scene, std::size_t patch,
@@ -121,6 +131,22 @@ bool is_partly_covered(const PatchMesh& mesh, const Scene& scene, std::size_t pa
   Polygon element;
   mesh.polygon_of(mesh.patches[patch], element);
   return is_crossed(element, scene);
+}
+
+double free_area_in_open_m2(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+                            std::size_t patch, double row_sum_m2) {
+  constexpr int kPoints = 32;  // squared
+  const double area_m2 = mesh.patches[patch].area_m2;
+  Polygon element;
+  mesh.polygon_of(mesh.patches[patch], element);
+  if (!is_crossed(element, scene)) return area_m2;
+  int free = 0;
+  for (int k = 0; k < kPoints * kPoints; ++k)
+    free += is_free(
+        mesh, scene, visibility, patch,
+        sample_polygon(element, (k / kPoints + 0.5) / kPoints, (k % kPoints + 0.5) / kPoints));
+  if (free == 0) return area_m2;
+  return std::clamp(area_m2 * free / (kPoints * kPoints), std::min(row_sum_m2, area_m2), area_m2);
 }
 
 std::vector<char> whole_patches(const PatchMesh& mesh, const Scene& scene,

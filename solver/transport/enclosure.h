@@ -46,8 +46,15 @@ bool is_partly_covered(const PatchMesh& mesh, const Scene& scene, std::size_t pa
 std::vector<char> whole_patches(const PatchMesh& mesh, const Scene& scene,
                                 const std::vector<char>& usable, const Eigen::VectorXd& row_sums);
 
-/// Whether a point of an element of a closed scene is free: a ray along its normal meets a lit
-/// side, and no surface of opposite normal lies on it.
+/// What is free of an element of an open scene, whose row tells nothing of that, m^2: by `is_free`
+/// at 32 x 32 points where a surface crosses it, to 2 % of its area, though no less than its row
+/// sums to; all of it elsewhere.
+double free_area_in_open_m2(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
+                            std::size_t patch, double row_sum_m2);
+
+/// Whether a point of an element is free: one of 16 rays meets a lit side, and no surface of
+/// opposite normal lies on it. Inside a solid and below a floor none does; what faces nothing but
+/// backs and the dark outside counts as covered too: no light comes from there.
 bool is_free(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
              std::size_t patch, const Vec3& point);
 

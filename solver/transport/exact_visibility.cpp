@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "transport/nusselt.h"
-#include "transport/quadrature.h"
+#include "transport/polygon_rule.h"
 #include "transport/shadow_cones.h"
 #include "transport/split_by_shadows.h"
 #include "transport/view_events.h"
@@ -19,6 +19,8 @@ namespace {
 constexpr std::size_t kMostCells = 20'000;  // of the first cut; bisection goes on from there
 constexpr double kMostlyVisible = 0.1;      // share from which the hidden part is integrated
 constexpr double kRounding = 100.0 * std::numeric_limits<double>::epsilon();  // of the whole pair
+constexpr double kTermRounding = 20.0 * std::numeric_limits<double>::epsilon();  // of Lambert's sum
+constexpr double kCutsAddTerms = 4.0;  // edges of shadows, which a visible part sums as well
 
 // A bilinear quad of the receiver (a triangle repeats a corner) and what was found on it.
 struct Cell {
@@ -167,7 +169,7 @@ class Integrator {
     integrate_visible_ = options_.nusselt_arcs > 0 || visible < kMostlyVisible * all;
     BoundedExchange whole;
     if (!integrate_visible_) whole = bounded_exchange(receiver_, source_, 1e-13);
-    const double rounding = kRounding * all;
+    const double rounding = kRounding * all + rounding_of_terms_m2();
     refine(whole.exchange_area_m2, rounding + whole.error_bound_m2);
     result.exchange_area_m2 =
         integrate_visible_ ? value_ : std::max(0.0, whole.exchange_area_m2 - value_);
@@ -186,6 +188,15 @@ class Integrator {
     return visible ? shadows_.visible(point) : shadows_.hidden(point);
   }
 
+  // Where the planes are nearly one, terms of order 1 sum up to little.
+  double rounding_of_terms_m2() const {
+    const Vec3& normal = receiver_.plane.normal;
+    double most = lambert_terms(receiver_.centroid, normal, source_.vertices);
+    for (const Vec3& corner : receiver_.vertices)
+      most = std::max(most, lambert_terms(corner, normal, source_.vertices));
+    return kTermRounding * kCutsAddTerms * receiver_.area_m2 * most;
+  }
+
   void add_cells(const Polygon& p) {
     for (std::size_t k = 1; k + 1 < p.size(); k += 2) {
       const bool quad = k + 2 < p.size();
@@ -199,18 +210,12 @@ class Integrator {
   template <int kPoints>
   double gauss(const Cell& cell, std::array<std::array<double, kPoints>, kPoints>& values) {
     const GaussRule& rule = gauss_rule(kPoints);
-    const auto& q = cell.corners;
-    const Vec3& normal = receiver_.plane.normal;
     double sum = 0.0;
-    for (int j = 0; j < kPoints; ++j)
-      for (int i = 0; i < kPoints; ++i) {
-        const double u = rule.nodes[i], v = rule.nodes[j];
-        const Vec3 x = (1 - v) * ((1 - u) * q[0] + u * q[1]) + v * ((1 - u) * q[3] + u * q[2]);
-        const Vec3 du = (1 - v) * (q[1] - q[0]) + v * (q[2] - q[3]);
-        const Vec3 dv = (1 - u) * (q[3] - q[0]) + u * (q[2] - q[1]);
-        values[i][j] = normal.dot(du.cross(dv)) * factor_at(x, integrate_visible_);
-        sum += rule.weights[i] * rule.weights[j] * values[i][j];
-      }
+    for_each_gauss_point_of_quad(cell.corners, receiver_.plane.normal, kPoints,
+                                 [&](int i, int j, const Vec3& x, double area) {
+                                   values[i][j] = area * factor_at(x, integrate_visible_);
+                                   sum += rule.weights[i] * rule.weights[j] * values[i][j];
+                                 });
     return sum;
   }
 

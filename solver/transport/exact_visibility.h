@@ -34,7 +34,8 @@ struct VisibleExchange {
 /// hidden and subtract it from the closed form.
 ///
 /// The error bound sums |Q5 - Q3| (or |Q3 - Q2|) of tensor Gauss rules over all cells, the
-/// difference that the better rule removes, and adds rounding.
+/// difference that the better rule removes, and adds rounding, in proportion to the terms of
+/// Lambert's sum: where the planes are nearly one, they cancel.
 /// Sources: Nishita & Nakamae (1985); Heckbert (1992), Drettakis & Fiume (1994) for the lines;
 /// Berntsen, Espelid, Genz (1991) for adaptive cubature.
 VisibleExchange visible_exchange(const PlanarPolygon& i, const PlanarPolygon& j,

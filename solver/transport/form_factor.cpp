@@ -9,6 +9,7 @@
 
 #include "transport/bounded_exchange.h"
 #include "transport/grazing_exchange.h"
+#include "transport/polygon_rule.h"
 #include "transport/quadrature.h"
 
 namespace truebox {
@@ -33,18 +34,6 @@ double contour_sum(const Vec3& point, const Vec3& normal, std::span<const Vec3> 
   return std::max(0.0, -sum / (2.0 * std::numbers::pi));
 }
 
-// The sum of contour_sum without the signs of its terms.
-double contour_magnitude(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon) {
-  double sum = 0.0;
-  for (std::size_t k = 0; k < polygon.size(); ++k) {
-    const Vec3 a = polygon[k] - point, b = polygon[(k + 1) % polygon.size()] - point;
-    const Vec3 c = a.cross(b - a);
-    const double sine = c.norm();
-    if (sine > 0.0) sum += std::abs(std::atan2(sine, a.dot(b)) * normal.dot(c) / sine);
-  }
-  return sum / (2.0 * std::numbers::pi);
-}
-
 double radius_about(std::span<const Vec3> polygon, const Vec3& centre) {
   double radius = 0.0;
   for (const Vec3& v : polygon) radius = std::max(radius, (v - centre).norm());
@@ -66,35 +55,15 @@ int gauss_points(double radius, double distance, double tolerance) {
   return std::max(1, static_cast<int>(std::ceil(-0.5 * std::log(0.1 * tolerance) / std::log(rho))));
 }
 
-// Integral over a triangle (collapsed Gauss rule) or a convex quad (bilinear Gauss rule) of
-// Lambert's formula; other polygons as a fan of triangles.
-double integrate_quad(const std::array<Vec3, 4>& q, const Vec3& normal,
-                      std::span<const Vec3> source, int points) {
-  const GaussRule& rule = gauss_rule(points);
-  double sum = 0.0;
-  for (int j = 0; j < points; ++j)
-    for (int i = 0; i < points; ++i) {
-      const double u = rule.nodes[i], v = rule.nodes[j];
-      const Vec3 x = (1 - v) * ((1 - u) * q[0] + u * q[1]) + v * ((1 - u) * q[3] + u * q[2]);
-      const Vec3 du = (1 - v) * (q[1] - q[0]) + v * (q[2] - q[3]);
-      const Vec3 dv = (1 - u) * (q[3] - q[0]) + u * (q[2] - q[1]);
-      const double area = normal.dot(du.cross(dv));
-      sum += rule.weights[i] * rule.weights[j] * area * contour_sum(x, normal, source);
-    }
-  return sum;
-}
-
 double lambert_quadrature(const PlanarPolygon& receiver, const PlanarPolygon& source, int points) {
   const Vec3& normal = receiver.plane.normal;
-  const Polygon& p = receiver.vertices;
   if (points == 1)
     return receiver.area_m2 * contour_sum(receiver.centroid, normal, source.vertices);
-  if (p.size() == 4)
-    return integrate_quad({p[0], p[1], p[2], p[3]}, normal, source.vertices, points);
-  double sum = 0.0;
-  for (std::size_t k = 2; k < p.size(); ++k)
-    sum += integrate_quad({p[0], p[k - 1], p[k], p[0]}, normal, source.vertices, points);
-  return sum;
+  double mean = 0.0;
+  for_each_gauss_point(receiver.vertices, points, [&](const Vec3& x, double weight) {
+    mean += weight * contour_sum(x, normal, source.vertices);
+  });
+  return receiver.area_m2 * mean;
 }
 
 // integral_0^L ln(|x - (b0 + t u)| / scale) dt in closed form.
@@ -196,8 +165,8 @@ double contour_m2(const PlanarPolygon& receiver, const PlanarPolygon& source, do
   const int points = gauss_points(receiver.radius_m, nearest, tolerance);
   if (points > 8) return double_contour(receiver, source, tolerance, magnitude);
   if (magnitude)
-    *magnitude += receiver.area_m2 *
-                  contour_magnitude(receiver.centroid, receiver.plane.normal, source.vertices);
+    *magnitude +=
+        receiver.area_m2 * lambert_terms(receiver.centroid, receiver.plane.normal, source.vertices);
   return lambert_quadrature(receiver, source, points);
 }
 
@@ -255,6 +224,17 @@ double exchange_m2(const PlanarPolygon& i, const PlanarPolygon& j, double tolera
 }
 
 }  // namespace
+
+double lambert_terms(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const Vec3 a = polygon[k] - point, b = polygon[(k + 1) % polygon.size()] - point;
+    const Vec3 c = a.cross(b - a);
+    const double sine = c.norm();
+    if (sine > 0.0) sum += std::abs(std::atan2(sine, a.dot(b)) * normal.dot(c) / sine);
+  }
+  return sum / (2.0 * std::numbers::pi);
+}
 
 double point_to_polygon(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon) {
   const Plane horizon{normal, normal.dot(point)};

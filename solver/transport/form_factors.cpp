@@ -59,6 +59,18 @@ void repair(FormFactors& factors, const std::vector<char>& usable,
   summary.closure_residual_max = report.error_after_max;
 }
 
+// Elements that a surface crosses count with their free part in open scenes as in closed ones.
+void take_free_areas_of_open(FormFactors& factors, const PatchMesh& mesh, const Scene& scene,
+                             const Visibility& visibility) {
+  for (Eigen::Index i = 0; i < factors.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (!factors.usable[k]) continue;
+    factors.area_m2[i] =
+        free_area_in_open_m2(mesh, scene, visibility, k, factors.exchange_area_m2.col(i).sum());
+    factors.summary.covered_patches += factors.area_m2[i] < mesh.patches[k].area_m2;
+  }
+}
+
 class Builder {
  public:
   Builder(const PatchMesh& mesh, const Scene& scene, const Visibility& visibility,
@@ -113,6 +125,8 @@ class Builder {
       result.summary.covered_patches = covered.size();
       repair(result, whole_, sampled_, options_.repair);
       for (Eigen::Index i : covered) result.area_m2[i] = result.exchange_area_m2.col(i).sum();
+    } else {
+      take_free_areas_of_open(result, mesh_, scene_, visibility_);
     }
     result.summary.row_sum_max = 0.0;
     for (Eigen::Index i = 0; i < n; ++i)
@@ -328,6 +342,8 @@ FormFactors without_rays(const PatchMesh& mesh, const Scene& scene, const Visibi
     repair(result, whole, exact.partial, options.repair);
     for (Eigen::Index i : covered) result.area_m2[i] = result.exchange_area_m2.col(i).sum();
     summary.covered_patches = covered.size();
+  } else {
+    take_free_areas_of_open(result, mesh, scene, visibility);
   }
   summary.row_sum_max = 0.0;
   for (Eigen::Index i = 0; i < result.size(); ++i)

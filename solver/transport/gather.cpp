@@ -21,7 +21,8 @@ Eigen::Map<const Eigen::VectorXd> as_vector(const std::vector<double>& values) {
   return {values.data(), static_cast<Eigen::Index>(values.size())};
 }
 
-constexpr int kRulePoints = 4;  // a side
+constexpr int kRulePoints = 4;              // a side
+constexpr double kShadowTolerance = 1e-12;  // of the distance, as VisibleParts takes
 
 }  // namespace
 
@@ -85,6 +86,30 @@ double Gather::visible_factor(const Vec3& point, const Vec3& normal, std::span<c
     if (blocker_of_[p] != kNone)
       add_if_between(blocker_of_[p], point, horizon, polygon, piece, scratch);
   return factor_of_visible_parts(point, normal, polygon, plane, scratch);
+}
+
+// Of blockers that may hide a part of a piece, what each hides of the point's view.
+void Gather::cast_shadows(const Vec3& point, std::span<const std::uint32_t> between,
+                          Scratch& scratch) const {
+  scratch.shadows.resize(std::max(scratch.shadows.size(), between.size()));
+  for (std::size_t k = 0; k < between.size(); ++k)
+    scratch.shadows[k].cast(point, blockers_[blocker_of_[between[k]]]);
+}
+
+// visible_factor of a part of that piece: most parts are clear of all these shadows, or lie in one.
+double Gather::factor_between_shadows(const Vec3& point, const Vec3& normal,
+                                      std::span<const Vec3> polygon, std::uint32_t piece,
+                                      std::span<const std::uint32_t> between,
+                                      Scratch& scratch) const {
+  if (!any_beyond(polygon, {normal, normal.dot(point)}, 1.0, tolerance_m_)) return 0.0;
+  const double tolerance_m = kShadowTolerance * (polygon[0] - point).norm();
+  scratch.blockers.clear();
+  for (std::size_t k = 0; k < between.size(); ++k) {
+    if (scratch.shadows[k].misses(polygon, tolerance_m)) continue;
+    if (scratch.shadows[k].covers(polygon, tolerance_m)) return 0.0;
+    scratch.blockers.push_back(&blockers_[blocker_of_[between[k]]]);
+  }
+  return factor_of_visible_parts(point, normal, polygon, mesh_.pieces[piece].plane, scratch);
 }
 
 double Gather::mean_factor(std::uint32_t patch_index, std::uint32_t luminaire,
@@ -179,7 +204,7 @@ struct Gather::PartWalk {
       return;
     }
     const double factor =
-        gather.visible_factor(point, normal, polygon, piece, scratch.in_view, scratch);
+        gather.factor_between_shadows(point, normal, polygon, piece, scratch.in_view, scratch);
     if (factor > 0.0) visit(factor, {centre, halvings / 2, path});
   }
 };
@@ -209,6 +234,7 @@ void Gather::visit_parts(const Vec3& point, const Vec3& normal, const Polygon& p
                          Scratch& scratch) const {
   if (mesh_.pieces[piece].plane.distance_m(point) <= tolerance_m_) return;
   keep_in_view(point, normal, polygon, piece, between, scratch);
+  cast_shadows(point, scratch.in_view, scratch);
   PartWalk{*this, point, normal, piece, near_field, visit, scratch}.run(polygon, 0, 1);
 }
 
@@ -218,11 +244,18 @@ BandMatrix Gather::from_surfaces(const Vec3& point, const Vec3& normal, const Ba
       BandMatrix::Zero(static_cast<Eigen::Index>(scene_.surfaces.size()), radiosity.cols());
   const Plane horizon{normal, normal.dot(point)};
   Polygon polygon;
+  std::vector<std::uint32_t> between;  // of a piece: its elements need ask no others
   Eigen::VectorXd value(radiosity.cols());
   for (std::uint32_t p = 0; p < mesh_.pieces.size(); ++p) {
     const Piece& piece = mesh_.pieces[p];
     if (piece.plane.distance_m(point) <= tolerance_m_ ||
         !any_beyond(piece.polygon, horizon, 1.0, tolerance_m_))
+      continue;
+    keep_in_view(point, normal, piece.polygon, p, blocker_piece_, scratch);
+    between = scratch.in_view;
+    cast_shadows(point, between, scratch);
+    if (!between.empty() &&
+        visible_factor(point, normal, piece.polygon, p, between, scratch) == 0.0)
       continue;
     auto row = sum.row(static_cast<Eigen::Index>(piece.surface));
     for (std::uint32_t j = piece.first_patch; j < piece.first_patch + piece.patch_count; ++j) {
@@ -232,10 +265,11 @@ BandMatrix Gather::from_surfaces(const Vec3& point, const Vec3& normal, const Ba
           source_at(j, part.centre, part.depth, value);
           row += factor * value.transpose();
         };
-        visit_parts(point, normal, polygon, p, kNearField, blocker_piece_, add, scratch);
+        visit_parts(point, normal, polygon, p, kNearField, between, add, scratch);
+        cast_shadows(point, between, scratch);
         continue;
       }
-      const double factor = visible_factor(point, normal, polygon, p, scratch);
+      const double factor = factor_between_shadows(point, normal, polygon, p, between, scratch);
       if (factor > 0.0) row += factor * radiosity.row(j);
     }
   }

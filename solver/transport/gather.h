@@ -22,6 +22,7 @@ class Gather {
     Polygon polygon;
     std::vector<const Blocker*> blockers;
     std::vector<std::uint32_t> in_view;
+    std::vector<PointShadow> shadows;  ///< of a point, of those in view
   };
 
   Gather(const PatchMesh& mesh, const Scene& scene, bool occlusion);
@@ -71,6 +72,11 @@ class Gather {
 
  private:
   struct PartWalk;
+  void cast_shadows(const Vec3& point, std::span<const std::uint32_t> between,
+                    Scratch& scratch) const;
+  double factor_between_shadows(const Vec3& point, const Vec3& normal,
+                                std::span<const Vec3> polygon, std::uint32_t piece,
+                                std::span<const std::uint32_t> between, Scratch& scratch) const;
   void keep_in_view(const Vec3& point, const Vec3& normal, std::span<const Vec3> polygon,
                     std::uint32_t piece, std::span<const std::uint32_t> between,
                     Scratch& scratch) const;

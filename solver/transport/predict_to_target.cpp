@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
 
 #include "transport/grid_difference.h"
 
@@ -13,31 +14,63 @@ namespace {
 using Eigen::Index;
 
 constexpr double kReserve = 1.15;  // elements beyond the foretold: a miss costs another solve
-constexpr double kLargestStep = 8.0;
-constexpr double kSmallestStep = 1.4;
+// Edges halved once: some sixteenth of the cost is behind, and then the grids show their order.
+constexpr double kLargestStep = 4.0;
+constexpr double kSmallestStep = 1.5;  // bounds go up and down by a fifth from mesh to mesh
+constexpr double kMostElements = 200000.0;
+
+double elements_that_fit(const PredictOptions& options) {
+  if (options.find_exchange || options.solve_grid) return kMostElements;
+  return std::floor(
+      std::sqrt(static_cast<double>(options.form_factors.memory_limit_bytes) / sizeof(double)));
+}
+
+double least_elements(const PatchMesh& mesh) {
+  return 1.1 * Prediction::kPatchesAPiece * static_cast<double>(mesh.pieces.size());
+}
+
+// The bound falls like elements^(-3/4).
+double foretold_elements(const Prediction& prediction, double bound, double target) {
+  const double n = static_cast<double>(prediction.fine().mesh.size());
+  const double wanted = n * std::pow(bound / target, 2.0 / kGatheredOrder);
+  return prediction.bound_is_reliable() ? wanted
+                                        : std::max(wanted, least_elements(prediction.fine().mesh));
+}
+
+std::string name_of_band(const Scene& scene, std::size_t band) {
+  if (scene.is_total) return "all wavelengths";
+  return std::to_string(std::lround(scene.bands.centre_nm(band))).append(" nm");
+}
 
 }  // namespace
 
-double largest_relative_bound(const Prediction& prediction) {
-  const BandMatrix bound = prediction.surface_irradiance_bound();
-  const BandMatrix irradiance = prediction.irradiance();
-  const PatchMesh& mesh = prediction.fine().mesh;
-  BandMatrix mean = BandMatrix::Zero(bound.rows(), bound.cols());
-  Eigen::VectorXd area = Eigen::VectorXd::Zero(bound.rows());
-  for (std::size_t i = 0; i < mesh.size(); ++i) {
-    if (!prediction.fine().usable[i]) continue;
-    const auto surface = static_cast<Index>(mesh.surface_of(mesh.patches[i]));
-    const double free_m2 = prediction.fine().free_area_m2[static_cast<Index>(i)];
-    mean.row(surface) += free_m2 * irradiance.row(static_cast<Index>(i));
-    area[surface] += free_m2;
-  }
-  double largest = 0.0;
-  for (Index s = 0; s < bound.rows(); ++s) {
-    if (prediction.scene().surfaces[static_cast<std::size_t>(s)].is_opening) continue;
-    for (Index k = 0; k < bound.cols(); ++k)
-      if (mean(s, k) > 0.0) largest = std::max(largest, bound(s, k) * area[s] / mean(s, k));
+RelativeBound relative_bound_of_surfaces(const Prediction& prediction) {
+  const Scene& scene = prediction.scene();
+  const SurfaceMeans means = prediction.surface_means();
+  RelativeBound largest;
+  for (Index s = 0; s < means.irradiance.rows(); ++s) {
+    const Surface& surface = scene.surfaces[static_cast<std::size_t>(s)];
+    if (surface.is_opening) continue;
+    for (Index k = 0; k < means.irradiance.cols(); ++k) {
+      const double mean = means.irradiance(s, k);
+      if (!(mean > 0.0)) continue;
+      largest.in_order = std::max(largest.in_order, means.bound_in_order(s, k) / mean);
+      if (means.error_bound(s, k) <= largest.value * mean) continue;
+      largest.value = means.error_bound(s, k) / mean;
+      largest.where = surface.name + ", " + name_of_band(scene, static_cast<std::size_t>(k));
+    }
   }
   return largest;
+}
+
+double largest_relative_bound(const Prediction& prediction) {
+  return relative_bound_of_surfaces(prediction).value;
+}
+
+std::size_t least_reliable_elements(const Scene& scene) {
+  std::size_t pieces = 0;
+  for (const Surface& surface : scene.surfaces) pieces += surface.pieces.size();
+  return static_cast<std::size_t>(1.1 * Prediction::kPatchesAPiece * static_cast<double>(pieces));
 }
 
 TargetedPrediction predict_to_target(const Scene& scene, const PredictOptions& options,
@@ -48,15 +81,14 @@ TargetedPrediction predict_to_target(const Scene& scene, const PredictOptions& o
 }
 
 TargetedPrediction predict_to_target(const PredictOptions& options, double relative_error,
-                                     const Predictor& predict) {
+                                     const Predictor& predict, const Judge& judge) {
   if (!(relative_error > 0.0 && relative_error < 1.0))
     throw std::invalid_argument("a target error lies between 0 and 1");
   PredictOptions attempt = options;
   attempt.solve.relative_bound =
       std::min(options.solve.relative_bound, std::max(1e-12, 1e-3 * relative_error));
-  const auto largest_matrix = static_cast<std::size_t>(
-      std::sqrt(static_cast<double>(options.form_factors.memory_limit_bytes) / sizeof(double)));
   TargetedPrediction result;
+  result.elements_that_fit = elements_that_fit(options);
   while (true) {
     try {
       result.prediction = predict(attempt);
@@ -64,19 +96,24 @@ TargetedPrediction predict_to_target(const PredictOptions& options, double relat
       if (result.steps.empty()) throw;
       return result;
     }
-    const std::size_t elements = result.prediction->fine().mesh.size();
-    const double bound = largest_relative_bound(*result.prediction);
-    result.steps.push_back({elements, bound});
-    if (result.prediction->outcome() != SolveOutcome::converged) return result;
+    const Prediction& prediction = *result.prediction;
+    const double elements = static_cast<double>(prediction.fine().mesh.size());
+    const RelativeBound bound = judge(prediction);
+    result.steps.push_back({prediction.fine().mesh.size(), bound.value, bound.where});
+    if (prediction.outcome() != SolveOutcome::converged) return result;
     // A bound that may not hold is no bound: the grids must be fine enough for it first.
-    result.is_reached = bound <= relative_error && result.prediction->bound_is_reliable();
-    if (result.is_reached) return result;
-    const double wanted = kReserve * std::pow(bound / relative_error, 2.0 / kGatheredOrder);
-    const double growth = std::clamp(wanted, kSmallestStep, kLargestStep);
-    const double limit = static_cast<double>(largest_matrix) / static_cast<double>(elements);
-    if (limit < kSmallestStep) return result;
+    result.is_reached = bound.value <= relative_error && prediction.bound_is_reliable();
+    if (result.is_reached || prediction.fine().links) return result;
+    // Refused is only what is out of reach even if the grids converge as they should.
+    const double fits = result.elements_that_fit;
+    result.elements_needed = foretold_elements(prediction, bound.in_order, relative_error);
+    result.bound_that_fits = bound.in_order * std::pow(elements / fits, 0.5 * kGatheredOrder);
+    if (result.elements_needed > fits || kSmallestStep * elements > fits) return result;
+    const double wanted = kReserve * foretold_elements(prediction, bound.value, relative_error);
+    const double next =
+        std::min(std::clamp(wanted, kSmallestStep * elements, kLargestStep * elements), fits);
     attempt.elements =
-        static_cast<std::size_t>(static_cast<double>(attempt.elements) * std::min(growth, limit));
+        static_cast<std::size_t>(static_cast<double>(attempt.elements) * next / elements);
   }
 }
 

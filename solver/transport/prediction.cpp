@@ -51,6 +51,7 @@ FoundExchange full_matrix(const ExchangeRequest& request) {
 Prediction::Prediction(const Scene& scene, const PredictOptions& options)
     : scene_(&scene), needs_(requirements(scene)) {
   require_lambertian(scene);
+  is_uniform_ = !options.mesh_of_grid;
   distinct_scene_ = in_bands(scene, needs_.distinct_bands);
   const double edge_m = edge_for_count(scene, std::max<std::size_t>(1, options.elements / 16));
   PredictOptions chosen = options;
@@ -263,12 +264,8 @@ void Prediction::differentiate(const ExchangeOperator& exchange, const GridTask&
 
 std::vector<BandMatrix> Prediction::radiosity_by_reflectance() const {
   std::vector<BandMatrix> all;
-  for (const BandMatrix& distinct : fine().radiosity_by_reflectance) {
-    BandMatrix expanded(distinct.rows(), static_cast<Index>(scene_->bands.size()));
-    for (Index s = 0; s < distinct.rows(); ++s)
-      expanded.row(s) = expand(distinct.row(s).transpose()).transpose();
-    all.push_back(std::move(expanded));
-  }
+  for (const BandMatrix& distinct : fine().radiosity_by_reflectance)
+    all.push_back(expand_rows(distinct));
   return all;
 }
 
@@ -284,6 +281,13 @@ Eigen::VectorXd Prediction::expand(const Eigen::VectorXd& distinct) const {
   Eigen::VectorXd all(static_cast<Index>(needs_.band_source.size()));
   for (Index b = 0; b < all.size(); ++b)
     all[b] = needs_.band_scale[b] * distinct[static_cast<Index>(needs_.band_source[b])];
+  return all;
+}
+
+BandMatrix Prediction::expand_rows(const BandMatrix& distinct) const {
+  BandMatrix all(distinct.rows(), static_cast<Index>(scene_->bands.size()));
+  for (Index r = 0; r < all.rows(); ++r)
+    all.row(r) = expand(distinct.row(r).transpose()).transpose();
   return all;
 }
 

@@ -190,47 +190,25 @@ ErrorShares Prediction::find_error_shares(const Level& resampled) const {
     grids += surface_m2 * bound.row(static_cast<Index>(s)).transpose();
   }
   const Eigen::VectorXd total = expand(mean.transpose()), rays = expand(sampling.transpose()),
-                        solver = expand(solver_bounds());
+                        all_but_grids = expand(solver_bounds());
+  // What rows still miss is the factors' doing, not the solver's; with links the two are not told
+  // apart.
+  Eigen::VectorXd solver = all_but_grids;
+  if (!fine().links) {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(fine().indirect.cols());
+    for (const auto& level : levels_) sum += level->solution.solve.error_bound;
+    solver = expand(sum);
+  }
   ErrorShares shares;
   for (Index k = 0; k < total.size(); ++k) {
     if (!(total[k] > 0.0)) continue;
-    shares.form_factors = std::max(shares.form_factors, rays[k] / total[k]);
+    shares.form_factors =
+        std::max(shares.form_factors, (rays[k] + (all_but_grids[k] - solver[k]) * area) / total[k]);
     shares.solver = std::max(shares.solver, solver[k] * area / total[k]);
     shares.discretisation =
-        std::max(shares.discretisation, (grids[k] - solver[k] * area) / total[k]);
+        std::max(shares.discretisation, (grids[k] - all_but_grids[k] * area) / total[k]);
   }
   return shares;
-}
-
-BandMatrix Prediction::surface_irradiance_bound() const {
-  const auto surfaces = static_cast<Index>(scene_->surfaces.size());
-  BandMatrix all = BandMatrix::Zero(surfaces, static_cast<Index>(scene_->bands.size()));
-  if (!needs_.interreflection) return all;
-  const PatchMesh &mesh = fine().mesh, &next = coarse().mesh;
-  const Index bands = fine().indirect.cols();
-  BandMatrix children = BandMatrix::Zero(coarse().indirect.rows(), bands);
-  Eigen::VectorXd children_area = Eigen::VectorXd::Zero(children.rows());
-  for (std::size_t i = 0; i < mesh.size(); ++i) {
-    if (!fine().usable[i]) continue;
-    const double area = fine().free_area_m2[static_cast<Index>(i)];
-    const Patch& patch = mesh.patches[i];
-    const std::uint32_t parent = levels_[1]->smooth().find_patch(patch.piece, patch.centroid);
-    children.row(parent) += area * fine().indirect.row(static_cast<Index>(i));
-    children_area[parent] += area;
-  }
-  Eigen::VectorXd area = Eigen::VectorXd::Zero(surfaces);
-  BandMatrix sum = BandMatrix::Zero(surfaces, bands);
-  for (std::size_t p = 0; p < next.size(); ++p) {
-    const auto row = static_cast<Index>(p);
-    const auto surface = static_cast<Index>(next.surface_of(next.patches[p]));
-    sum.row(surface) +=
-        (children.row(row) - children_area[row] * coarse().indirect.row(row)).cwiseAbs();
-    area[surface] += children_area[row];
-  }
-  const Eigen::VectorXd solver = solver_bounds();
-  for (Index s = 0; s < surfaces; ++s)
-    if (area[s] > 0.0) all.row(s) = expand(sum.row(s).transpose() / area[s] + solver).transpose();
-  return all;
 }
 
 }  // namespace truebox

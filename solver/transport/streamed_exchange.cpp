@@ -43,6 +43,7 @@ class StreamedExchange final : public ExchangeOperator {
     const RowSums sums = row_sums(scale_);
     for (Index i : covered_) area_m2_[i] = sums.fixed[i] + sums.open[i];
     summary_.covered_patches = covered_.size();
+    if (!summary_.closed) take_free_areas_of_open(request.visibility, sums.fixed + sums.open);
     const VectorXd whole = (sums.fixed + sums.open).cwiseQuotient(area_m2_);
     summary_.row_sum_max = whole.maxCoeff();
     for (std::size_t i = 0; summary_.closed && i < usable_.size(); ++i)
@@ -132,6 +133,15 @@ class StreamedExchange final : public ExchangeOperator {
       summary_.buried_patches += !usable_[i];
     }
     if (summary_.buried_patches > 0) first_ = row_sums(scale_);
+  }
+
+  void take_free_areas_of_open(const Visibility& visibility, const VectorXd& row_sums_m2) {
+    for (std::size_t i = 0; i < usable_.size(); ++i) {
+      if (!usable_[i]) continue;
+      const auto k = static_cast<Index>(i);
+      area_m2_[k] = free_area_in_open_m2(mesh_, scene_, visibility, i, row_sums_m2[k]);
+      summary_.covered_patches += area_m2_[k] < mesh_.patches[i].area_m2;
+    }
   }
 
   // In a closed scene what sees nothing lies outside of it; its row is empty.

@@ -22,27 +22,49 @@ bool may_block(const Blocker& blocker, const Vec3& point, std::span<const Vec3> 
                      [&](const Vec3& v) { return source_plane.distance_m(v) > tolerance_m; });
 }
 
-void VisibleParts::remove_shadow(const Vec3& point, const Blocker& blocker) {
-  rest_.clear();
-  sides_.clear();
+void PointShadow::cast(const Vec3& point, const Blocker& blocker) {
+  sides.clear();
   const double side = blocker.plane.distance_m(point) > 0.0 ? 1.0 : -1.0;
-  const Plane near{side * blocker.plane.normal, side * blocker.plane.offset_m};
+  near = {side * blocker.plane.normal, side * blocker.plane.offset_m};
   const std::size_t n = blocker.polygon.size();
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3 a = blocker.polygon[i] - point, b = blocker.polygon[(i + 1) % n] - point;
     const Vec3 outward = side * a.cross(b);
     const double length = outward.norm();
-    if (length > 0.0) sides_.push_back({outward / length, outward.dot(point) / length});
+    if (length > 0.0) sides.push_back({outward / length, outward.dot(point) / length});
   }
+}
+
+// Most blockers that may hide a part of the source hide nothing of most of its parts.
+bool PointShadow::misses(std::span<const Vec3> polygon, double tolerance_m) const {
+  const auto none_behind = [&](const Plane& plane) {
+    return std::none_of(polygon.begin(), polygon.end(),
+                        [&](const Vec3& v) { return plane.distance_m(v) < -tolerance_m; });
+  };
+  return none_behind(near) || std::any_of(sides.begin(), sides.end(), none_behind);
+}
+
+bool PointShadow::covers(std::span<const Vec3> polygon, double tolerance_m) const {
+  const auto all_behind = [&](const Plane& plane) {
+    return std::all_of(polygon.begin(), polygon.end(),
+                       [&](const Vec3& v) { return plane.distance_m(v) < -tolerance_m; });
+  };
+  return all_behind(near) && std::all_of(sides.begin(), sides.end(), all_behind);
+}
+
+void VisibleParts::remove_shadow(const Vec3& point, const Blocker& blocker) {
+  rest_.clear();
+  shadow_.cast(point, blocker);
+  const Plane& near = shadow_.near;
   for (Polygon& part : parts_) {
-    if (misses(part, near, kTolerance * (part[0] - point).norm())) {
+    if (shadow_.misses(part, kTolerance * (part[0] - point).norm())) {
       rest_.push_back(std::move(part));
       continue;
     }
     const std::size_t before = rest_.size();
     current_ = part;
-    for (std::size_t i = 0; i < sides_.size() && !current_.empty(); ++i) {
-      const Plane& edge = sides_[i];
+    for (std::size_t i = 0; i < shadow_.sides.size() && !current_.empty(); ++i) {
+      const Plane& edge = shadow_.sides[i];
       const double tolerance = kTolerance * (current_[0] - point).norm();
       clip(current_, edge, tolerance, outside_);
       if (!outside_.empty()) rest_.push_back(outside_);
@@ -62,15 +84,6 @@ void VisibleParts::remove_shadow(const Vec3& point, const Blocker& blocker) {
     if (!outside_.empty()) rest_.push_back(outside_);
   }
   parts_.swap(rest_);
-}
-
-// Most blockers that may hide a part of the source hide nothing of most of its parts.
-bool VisibleParts::misses(const Polygon& part, const Plane& near, double tolerance) const {
-  const auto none_behind = [&](const Plane& plane) {
-    return std::none_of(part.begin(), part.end(),
-                        [&](const Vec3& v) { return plane.distance_m(v) < -tolerance; });
-  };
-  return none_behind(near) || std::any_of(sides_.begin(), sides_.end(), none_behind);
 }
 
 std::span<const Polygon> VisibleParts::operator()(const Vec3& point, std::span<const Vec3> source,

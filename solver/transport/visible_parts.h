@@ -14,6 +14,17 @@ struct Blocker {
   Plane plane;
 };
 
+/// What a blocker hides of a point's view: all behind `near` and behind each side of its pyramid.
+struct PointShadow {
+  Plane near;
+  std::vector<Plane> sides;
+
+  void cast(const Vec3& point, const Blocker& blocker);
+  /// Whether it certainly hides nothing, or all, of a convex polygon; within `tolerance_m` neither.
+  bool misses(std::span<const Vec3> polygon, double tolerance_m) const;
+  bool covers(std::span<const Vec3> polygon, double tolerance_m) const;
+};
+
 /// What a point sees of a convex polygon: `source` minus the shadow pyramid of each blocker, as
 /// convex parts. Exact to rounding: point-to-polygon factors of the parts carry no sampling noise.
 /// Sources: Nishita & Nakamae (1985); Weiler & Atherton (1977).
@@ -26,10 +37,9 @@ class VisibleParts {
 
  private:
   void remove_shadow(const Vec3& point, const Blocker& blocker);
-  bool misses(const Polygon& part, const Plane& near, double tolerance) const;
 
   std::vector<Polygon> parts_, rest_;
-  std::vector<Plane> sides_;  // of a shadow pyramid, what it hides behind them
+  PointShadow shadow_;
   Polygon outside_, inside_, current_;
 };
 

@@ -247,6 +247,17 @@ TEST_F(Program, ProbeLeavesATable) {
   }
 }
 
+TEST_F(Program, ProbeReadsFromTheFieldWhatIsWithinAShareAndGathersTheRest) {
+  const std::string points =
+      write("w.csv", "name,x,y,z,nx,ny,nz\non,0.5,0.5,0,0,0,1\nin_the_air,0.2,0.3,0.1,0,0,1\n");
+  const std::string command =
+      "probe " + room() + " --elements 200 --points " + points + " -o " + file("w_out.csv");
+  EXPECT_THAT(run(command + " --within 90%").text, HasSubstr("1 of 2 points read from the field"));
+  EXPECT_THAT(run(command + " --within 0.0001%").text,
+              HasSubstr("0 of 2 points read from the field"));
+  EXPECT_EQ(run(command + " --within 5% --reconstruction smooth").code, 64);
+}
+
 TEST_F(Program, RenderLeavesASpectralImage) {
   ASSERT_EQ(run("render " + room() + " --elements 200 --camera eye -o " + file("r.exr") +
                 " --error-bound " + file("b.exr"))
@@ -458,13 +469,24 @@ TEST_F(Program, SolvesToATargetError) {
   const Outcome found =
       run("solve " + room() + " --target-error 5% --sensitivities -o " + file("t.json"));
   ASSERT_EQ(found.code, 0) << found.text;
-  EXPECT_THAT(found.text, HasSubstr("means of surfaces bound to"));
+  EXPECT_THAT(found.text, HasSubstr("largest bound"));
   const auto json = nlohmann::json::parse(text_of(file("t.json")));
   EXPECT_LE(json.at("largest_relative_bound_of_a_surface").get<double>(), 0.05);
   EXPECT_FALSE(json.at("target_missed").get<bool>());
   EXPECT_TRUE(json.at("surfaces").at(0).contains("radiosity_by_reflectance"));
   EXPECT_EQ(run("solve " + room() + " --target-error 0").code, 64);
   EXPECT_EQ(run("solve " + room() + " --target-error half").code, 64);
+}
+
+TEST_F(Program, RefusesATargetThatMemoryDoesNotHoldAndSaysWhatItDoes) {
+  const Outcome refused = run("solve " + room() + " --target-error 0.001% --memory 64 --quiet");
+  EXPECT_EQ(refused.code, 5) << refused.text;
+  EXPECT_THAT(refused.text, HasSubstr("elements are foretold for it"));
+  EXPECT_THAT(refused.text, HasSubstr("2896 fit, for which a bound of"));
+  const Outcome links =
+      run("solve " + room() + " --target-error 5% --form-factors hierarchical --quiet");
+  EXPECT_EQ(links.code, 4);
+  EXPECT_THAT(links.text, HasSubstr("links have an estimate"));
 }
 
 // Polynomials and constants solve the same equation: they differ by no more than both bounds.

@@ -120,6 +120,39 @@ TEST(PartlyCoveredElements, SunkenBlockLightsTheRoomAsOneThatStandsOnTheFloor) {
   EXPECT_NEAR(sunk.absorbed_W, emitted_W, 2e-3 * emitted_W);
 }
 
+// The same with a wall taken away, where rows do not tell what is free of an element.
+class PartlyCoveredInTheOpen : public testing::TestWithParam<Way> {};
+
+TEST_P(PartlyCoveredInTheOpen, SunkenBlockLightsTheRoomAsOneThatStandsOnTheFloor) {
+  const auto opened = [](double lowest_m) {
+    Scene scene = lit(lowest_m);
+    scene.surfaces.erase(scene.surfaces.begin() + 2);  // a wall
+    return scene;
+  };
+  const Scene sunk_scene = opened(-0.07), standing_scene = opened(0.0);
+  const std::size_t elements = GetParam() == Way::streamed ? 150 : 800;
+  const auto sunk_solution = solved(sunk_scene, GetParam(), elements);
+  const auto standing_solution = solved(standing_scene, GetParam(), elements);
+  ASSERT_FALSE(sunk_solution->fine().form_factors.closed);
+  ASSERT_GT(sunk_solution->fine().form_factors.covered_patches, 5u);
+  const Means sunk = means_of(*sunk_solution), standing = means_of(*standing_solution);
+  const BandMatrix bound = sunk_solution->surface_irradiance_bound(),
+                   other = standing_solution->surface_irradiance_bound();
+  for (std::size_t s = 0; s < standing.area_m2.size(); ++s) {
+    if (standing.area_m2[s] == 0.0) continue;  // the block's underside
+    const auto row = static_cast<Index>(s);
+    // Free areas are found to 2 % of an element's, of few elements.
+    EXPECT_NEAR(sunk.area_m2[s], standing.area_m2[s], 0.01 * standing.area_m2[s])
+        << sunk_scene.surfaces[s].name;
+    EXPECT_NEAR(sunk.irradiance[s], standing.irradiance[s],
+                bound(row, 0) + other(row, 0) + 0.01 * standing.irradiance[s])
+        << sunk_scene.surfaces[s].name;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Ways, PartlyCoveredInTheOpen,
+                         testing::Values(Way::outlines, Way::rays, Way::streamed), name_of);
+
 // Below a sheet it is dark, and yet no element is buried there: the floor's mean is over all of it.
 TEST(BuriedElements, AreNotThoseInTheShadowOfASheet) {
   Scene scene = tiny::grey_scene(0.5);

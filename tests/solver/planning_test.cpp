@@ -228,14 +228,14 @@ TEST(Plan, StreamsRowsWhereAMatrixDoesNotFitAndTheyAreSoonMade) {
   EXPECT_EQ(decision(plan, "exchange").error_kind, ErrorKind::none);
 }
 
-// Cornell Box, uniform: 37,000 elements are foretold for 1 %, which take 10 GiB.
+// Cornell Box, uniform: 35,000 elements are foretold for 0.9 %, which take 9 GiB.
 TEST(Plan, AdaptsWhereAUniformMatrixDoesNotFitThoughItWereSooner) {
-  const Plan plan = make_plan(cornell_box(), target(0.01));
+  const Plan plan = make_plan(cornell_box(), target(0.009));
   EXPECT_EQ(plan.mesh, PlannedMesh::adapted);
   const double limit = std::sqrt(static_cast<double>(PlanRequest{}.memory_limit_bytes) / 8.0);
   EXPECT_GT(decision(plan, "mesh").full_work, limit) << "nothing is left to choose";
   EXPECT_LT(static_cast<double>(plan.elements), limit);
-  EXPECT_LE(decision(plan, "mesh").error, 0.01);
+  EXPECT_LE(decision(plan, "mesh").error, 0.009);
 }
 
 Scene closed_box() {
