@@ -413,7 +413,7 @@ TEST_F(Program, RadiosityRefusesAMirrorAndPathsTraceIt) {
   const std::string scene = write("mirror.toml", text);
   const Outcome plan = run("plan " + scene + " --json " + file("plan.json"));
   EXPECT_EQ(plan.code, 0);
-  EXPECT_THAT(plan.text, HasSubstr("path tracing: needed, surface \"floor\" is a mirror"));
+  EXPECT_THAT(plan.text, HasSubstr("surface \"floor\" is a mirror; radiosity knows"));
   EXPECT_TRUE(nlohmann::json::parse(text_of(file("plan.json")))["path_tracing"].get<bool>());
   for (const std::string& arguments : {"solve " + scene, "render " + scene + " -o " + file("x.exr"),
                                        "sweep " + scene + " --of radiosity"}) {
