@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "mesh/smooth_field.h"
@@ -27,9 +28,12 @@ class BandSystems {
     double of_band[8];
   };
   struct EightBands {
-    std::vector<Lanes> factor;  // rows of L one after the other, 1 / L_ii on the diagonal
-    std::vector<Lanes> scale;   // s
+    std::vector<std::unique_ptr<Lanes[]>> memory;  // of the rows that joined together
+    std::vector<Lanes*> rows;                      // of L, 1 / L_ii on the diagonal
+    std::vector<Lanes> scale;                      // s
   };
+  bool append(const BandMatrix& rows, const BandMatrix& scale, Eigen::Index first,
+              EightBands& eight) const;
   Eigen::Index size_ = 0, bands_;
   std::vector<EightBands> eights_;
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "transport/reduced_basis.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -100,8 +102,8 @@ class ReducedBasis {
 
   void put() {
     s_.gathered.resize(n_, m_);
-    for (const ReflectanceGroup& group : groups_) group.put(s_.b, s_.gathered);
-    for (Index i = 0; i < n_; ++i) s_.gathered.row(i) *= s_.exchange.area_m2()[i];
+    tbb::parallel_for(std::size_t{0}, groups_.size(),
+                      [&](std::size_t g) { groups_[g].put(s_.b, s_.gathered); });
   }
 
   // More functions; false if there are none, or too many.
@@ -110,12 +112,17 @@ class ReducedBasis {
     Index size = old;
     std::vector<ElementBlock> blocks;
     double columns = 0.0;
-    for (ReflectanceGroup& group : groups_) {
-      BandMatrix added = group.extend(allowed_, std::max(kEnd, kNext * worst), size);
-      if (added.cols() == 0) continue;
-      size += added.cols();
-      columns += static_cast<double>(added.cols() * group.size()) / static_cast<double>(n_);
-      blocks.push_back({group.elements(), std::move(added)});
+    std::vector<BandMatrix> added(groups_.size());
+    tbb::parallel_for(std::size_t{0}, groups_.size(), [&](std::size_t g) {
+      added[g] = groups_[g].extend(allowed_, std::max(kEnd, kNext * worst));
+    });
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const Index more = added[g].cols();
+      if (more == 0) continue;
+      groups_[g].number(size, more);
+      size += more;
+      columns += static_cast<double>(more * groups_[g].size()) / static_cast<double>(n_);
+      blocks.push_back({groups_[g].elements(), std::move(added[g])});
     }
     if (blocks.empty() || size > most_functions()) return false;
     s_.summary.matrix_passes += columns / static_cast<double>(m_);
@@ -131,8 +138,9 @@ class ReducedBasis {
     BandMatrix rows(size - old, size);
     emitted_.conservativeResize(size, m_);
     sqrt_rho_.conservativeResize(size, m_);
-    for (ReflectanceGroup& group : groups_) {
-      group.take(gathered);
+    tbb::parallel_for(std::size_t{0}, groups_.size(),
+                      [&](std::size_t g) { groups_[g].take(gathered); });
+    for (const ReflectanceGroup& group : groups_) {
       if (group.functions().empty()) continue;
       rows(Eigen::all, group.functions()) = group.project(group.rows_of(gathered)).transpose();
       const BandMatrix emitted = group.project_source(old);

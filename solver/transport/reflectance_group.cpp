@@ -20,6 +20,7 @@ using Eigen::Index;
 constexpr Index kSample = 96;  // elements that bands are chosen by, at first
 constexpr Index kChunk = 64;   // rows that are measured in one go, whatever the threads
 constexpr std::size_t kMostGroups = 64;
+constexpr Index kRoom = 64;          // functions, at first
 constexpr double kDependent = 1e-8;  // of a column: what rounding leaves of one of the others
 
 // Of two, a NaN rather than a number.
@@ -43,7 +44,7 @@ void measure_row(Index bands, const double* source, const double* rho, const dou
 // Room for `columns`, the first `used` kept.
 void make_room(BandMatrix& matrix, Index used, Index columns) {
   if (columns <= matrix.cols()) return;
-  BandMatrix wider(matrix.rows(), std::max<Index>(2 * matrix.cols(), (columns + 7) / 8 * 8));
+  BandMatrix wider(matrix.rows(), std::max({2 * matrix.cols(), columns, kRoom}));
   wider.leftCols(used) = matrix.leftCols(used);
   matrix.swap(wider);
 }
@@ -93,10 +94,10 @@ ReflectanceGroup::Sizes ReflectanceGroup::measure(const BandMatrix& coefficients
   return part[0];
 }
 
-void ReflectanceGroup::put(BandMatrix& radiosity, BandMatrix& irradiance) const {
+void ReflectanceGroup::put(BandMatrix& radiosity, BandMatrix& power) const {
   for (Index i = 0; i < size(); ++i) {
     const Index element = elements_[static_cast<std::size_t>(i)];
-    irradiance.row(element) = irradiance_.row(i);
+    power.row(element) = area_m2_[i] * irradiance_.row(i);
     radiosity.row(element) = source_.row(i) + rho_.cwiseProduct(irradiance_.row(i));
   }
 }
@@ -165,7 +166,11 @@ Eigen::MatrixXd ReflectanceGroup::orthonormal_part(const std::vector<Index>& ban
   return found.leftCols(count);
 }
 
-BandMatrix ReflectanceGroup::extend(const Eigen::VectorXd& allowed, double leave, Index first) {
+void ReflectanceGroup::number(Index first, Index count) {
+  for (Index f = 0; f < count; ++f) functions_.push_back(first + f);
+}
+
+BandMatrix ReflectanceGroup::extend(const Eigen::VectorXd& allowed, double leave) {
   const std::vector<Index> bands = bands_to_follow(allowed, leave);
   if (bands.empty()) return BandMatrix(size(), 0);
   const Eigen::MatrixXd added = orthonormal_part(bands, allowed);
@@ -174,7 +179,6 @@ BandMatrix ReflectanceGroup::extend(const Eigen::VectorXd& allowed, double leave
   vectors_.bottomRows(more) = added.transpose();
   make_room(values_, old, old + more);
   values_.middleCols(old, more) = added;
-  for (Index f = 0; f < more; ++f) functions_.push_back(first + f);
   return added;
 }
 

@@ -32,12 +32,14 @@ class ReflectanceGroup {
   };
   /// Takes y, functions of all groups x bands.
   Sizes measure(const BandMatrix& coefficients);
-  /// M + rho F B and F B as last measured, into the rows of these elements.
-  void put(BandMatrix& radiosity, BandMatrix& irradiance) const;
+  /// M + rho F B and A F B as last measured, into the rows of these elements.
+  void put(BandMatrix& radiosity, BandMatrix& power) const;
 
-  /// Makes new functions, numbered from `first`, of as few bands' residuals as all bands' are
-  /// combinations of, up to `leave` times what is allowed in each; elements x functions.
-  BandMatrix extend(const Eigen::VectorXd& allowed, double leave, Index first);
+  /// Makes new functions of as few bands' residuals as all bands' are combinations of, up to
+  /// `leave` times what is allowed in each; elements x functions.
+  BandMatrix extend(const Eigen::VectorXd& allowed, double leave);
+  /// Numbers so many new functions from `first` on.
+  void number(Index first, Index count);
   /// F w of the new functions of all groups: all elements x functions.
   void take(const BandMatrix& gathered);
 
