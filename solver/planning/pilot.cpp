@@ -14,8 +14,8 @@
 namespace truebox {
 namespace {
 
-constexpr double kReserve = 1.15;        // as predict_to_target takes
-constexpr double kBoundOrder = 3.0 / 4;  // the bound falls like elements^-this
+constexpr double kReserve = 1.15, kSmallestStep = 1.5;  // as predict_to_target takes
+constexpr double kBoundOrder = 3.0 / 4;                 // the bound falls like elements^-this
 // And the rms error of the field: measured, solver/README.md.
 constexpr double kFieldOrder = 0.6, kAdaptedFieldOrder = 1.0;
 constexpr double kLeastCostExponent = 1.6;  // measured from 2400 to 10,000 elements
@@ -56,8 +56,9 @@ double Pilot::error() const {
 
 double Pilot::elements_for(double wanted_error) const {
   if (error() <= wanted_error) return static_cast<double>(elements);
-  return kReserve * static_cast<double>(elements) *
-         std::pow(error() / wanted_error, 1.0 / error_order);
+  const double from = measure == ErrorMeasure::rms_irradiance ? field_error : bound_in_order;
+  return static_cast<double>(elements) *
+         std::max(kSmallestStep, kReserve * std::pow(from / wanted_error, 1.0 / error_order));
 }
 
 double Pilot::error_for(double wanted_elements) const {
@@ -93,7 +94,9 @@ Pilot fly_pilot(const Scene& scene, const PredictOptions& options,
   if (growth > 1.5 && small_s > 0.0)
     pilot.cost_exponent = std::clamp(std::log(pilot.processor_s / small_s) / std::log(growth),
                                      kLeastCostExponent, 2.0);
-  pilot.relative_bound = largest_relative_bound(*prediction);
+  const RelativeBound bound = relative_bound_of_surfaces(*prediction);
+  pilot.relative_bound = bound.value;
+  pilot.bound_in_order = bound.in_order;
   if (measure == ErrorMeasure::rms_irradiance) pilot.field_error = field_error(*prediction);
   pilot.indirect_share = indirect_share(*prediction);
   pilot.form_factors = grid.form_factors;

@@ -21,6 +21,9 @@ struct Pilot {
   std::size_t elements = 0;
   ErrorMeasure measure = ErrorMeasure::bound_of_means;
   double relative_bound = 0.0;  ///< bound_of_means
+  /// The same if its grids converge as they should: what finer ones are foretold from, see
+  /// SurfaceMeans::bound_in_order.
+  double bound_in_order = 0.0;
   double field_error = 0.0;     ///< rms_irradiance
   double error_order = 0.75;    ///< the measured error falls like elements^-this
   double processor_s = 0.0;     ///< all threads, three grids

@@ -91,9 +91,12 @@ void Planner::decide_mesh() {
   MeshChoice choice;
   choice.uniform_elements = choice.elements =
       std::max(uniform.elements_for(request_.target_error), least_elements());
-  choice.why = std::string("the pilot's ") + (is_rms() ? "rms error" : "bound") + " of " +
-               percent(uniform.error()) + " with " + count(uniform.elements) +
-               " elements falls like elements^(" + (is_rms() ? "-0.6" : "-3/4") + ")";
+  choice.why =
+      std::string("the pilot's ") + (is_rms() ? "rms error" : "bound") + " of " +
+      percent(uniform.error()) + " with " + count(uniform.elements) + " elements" +
+      (is_rms() ? ""
+                : ", " + percent(uniform.bound_in_order) + " if its grids converge in order,") +
+      " falls like elements^(" + (is_rms() ? "-0.6" : "-3/4") + ")";
   adapt_if_it_pays(uniform, choice);
   choice.error = choice.elements > least_elements()
                      ? request_.target_error
