@@ -19,7 +19,7 @@ namespace {
 constexpr double kCoarseLinks = 0.1, kFineLinks = 1e-2;
 // Measured by tests/benchmark/links_or_matrix.cpp, see solver/README.md: the size that links need,
 // and how their time grows.
-constexpr double kLinksPayFrom = 4700.0;
+constexpr double kLinksPayFrom = 5500.0;
 constexpr double kLinksByElements = 0.55, kLinksByTolerance = 0.8;
 constexpr double kMeshShare = 0.8;  // of the error that is asked for
 constexpr std::size_t kLinkPilotElements = 2000;

@@ -241,7 +241,7 @@ PlanRequest rms_target(double error) {
   return request;
 }
 
-// Uniform elements: from a matrix of some 4700 on (tests/benchmark/links_or_matrix.cpp). Adapted
+// Uniform elements: from a matrix of some 5500 on (tests/benchmark/links_or_matrix.cpp). Adapted
 // ones with a matrix may still be sooner than both; on a busy machine, too.
 TEST(Plan, OfRmsIrradianceTakesLinksOrAdaptsWhereAUniformMatrixTakesLonger) {
   const Scene box = in_bands_at(closed_box(), {550.0});
