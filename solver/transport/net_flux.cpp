@@ -18,8 +18,7 @@ std::vector<SurfaceFlux> net_fluxes(const Prediction& prediction) {
     const auto row = static_cast<Index>(s);
     const double area_m2 = means.area_m2[row];
     SurfaceFlux flux{scene.surfaces[s].name, area_m2, {}, {}};
-    flux.net_W =
-        area_m2 * (exitance - (1.0 - rho) * means.irradiance.row(row).transpose().array());
+    flux.net_W = area_m2 * (exitance - (1.0 - rho) * means.irradiance.row(row).transpose().array());
     flux.bound_W = area_m2 * (1.0 - rho) * means.error_bound.row(row).transpose().array();
     fluxes.push_back(std::move(flux));
   }

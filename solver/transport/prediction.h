@@ -187,13 +187,13 @@ class Prediction {
   BandMatrix surface_irradiance_bound() const;
 
   /// Better means: extrapolated by a third of the difference between the grids, where the bound is
-  /// reliable. On uniform grids their bound is a grid convergence index of three grids: D the larger
-  /// of the differences as above, d_1 and d_2 / 2^1.5, the order p observed, log2(d_2 / d_1), though
-  /// taken as no less than 1 and no more than 1.5; then
+  /// reliable. On uniform grids their bound is a grid convergence index of three grids: D the
+  /// larger of the differences as above, d_1 and d_2 / 2^1.5, the order p observed, log2(d_2 /
+  /// d_1), though taken as no less than 1 and no more than 1.5; then
   ///   |e| <= 1.25 D max(1 / (2^p - 1) - 1/3, 1/3),
   /// 1/3 where grids converge faster than the extrapolation takes them to. Meshes of another kind
-  /// have no third grid to see an order by: |e| <= d_1. Source: Roache (1998), safety factor 1.25 of
-  /// three grids.
+  /// have no third grid to see an order by: |e| <= d_1. Source: Roache (1998), safety factor 1.25
+  /// of three grids.
   SurfaceMeans surface_means() const;
 
  private:
